@@ -47,14 +47,8 @@ def parse_selection(text: str, suite: Suite) -> Selection:
         raise UserError(
             f'"{visible(text)}" is not a valid selection; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX'
         )
-    if name not in suite.tasks:
-        name = next((task for task in suite.tasks if task.lower() == name.lower()), name)
-    task = suite.task(name)
-    selection: Selection = (name, *map(int, numbers))
-    if numbers and int(numbers[0]) >= len(task.prompts):
-        known = f"{name} has prompts 0 to {len(task.prompts) - 1}"
-        raise UserError(f"{name}/{'/'.join(numbers)} does not exist, because {known}")
-    return selection
+    known = next((task for task in suite.tasks if task.lower() == name.lower()), name)
+    return (suite.task(known).name, *map(int, numbers))
 
 
 def expect_judged(selection: Selection, judged: Iterable[CompletionKey]) -> None:

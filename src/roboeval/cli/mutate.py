@@ -17,7 +17,7 @@ from roboeval.cli.output import note, print_rich, show_progress
 if TYPE_CHECKING:
     from roboeval.mutation.mutants import Original
     from roboeval.mutation.score import MutationScore
-    from roboeval.suites.load import Suite, Task
+    from roboeval.suites.load import Suite
 
 
 def mutate(
@@ -63,7 +63,7 @@ def mutate(
     from roboeval.mutation.trials import mutation_score
 
     known = load(suite)
-    wanted = select_tasks(known, tasks)
+    wanted = [known.task(name) for name in tasks or known.tasks]
     further = named_programs(also or [], known)
     score = partial(mutation_score, worlds=worlds, most=most, seed=seed, progress=show_progress)
     with WorkerPool(workers or cores(), one_process_per_run=one_process_per_run) as pool:
@@ -74,12 +74,6 @@ def mutate(
         note(f"the scores, mutants and survivors are in {out}")
     if at_least is not None and any(score.score is None or score.score < at_least for score in scores):
         raise SystemExit(1)
-
-
-def select_tasks(suite: Suite, words: Sequence[str] | None) -> list[Task]:
-    """Return the tasks with these names. A word may contain several names separated by commas."""
-    names = [name for word in words or suite.tasks for name in word.split(",")]
-    return [suite.task(name) for name in dict.fromkeys(names)]
 
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from roboeval.cli.inputs import command, load
-from roboeval.cli.options import JsonOption, SuiteOption
-from roboeval.cli.output import fail, note, print_json, print_rich, print_text, show_progress
+from roboeval.cli.options import SuiteOption
+from roboeval.cli.output import fail, note, print_rich, print_text, show_progress
 
 if TYPE_CHECKING:
     from roboeval.suites.load import Suite, Task
@@ -29,24 +29,19 @@ def tasks(
         str | None,
         typer.Option(help="Create a task with this name in the folder --suite, which is created if needed."),
     ] = None,
-    json: JsonOption = False,
 ) -> None:
     """List, show or lint a suite's tasks, or create a new task."""
     if new is not None:
-        if task is not None or lint or accepted or json:
+        if task is not None or lint or accepted:
             fail("--new can only be combined with --suite; leave out the other options")
         start(new, suite)
         return
     if accepted and not lint:
         fail("--accepted needs --lint; add it")
-    if json and lint:
-        fail("--lint has no JSON output; leave out --json")
     known = load(suite)
-    chosen = list(known.tasks.values()) if task is None else [known.task(task)]
     if lint:
+        chosen = list(known.tasks.values()) if task is None else [known.task(task)]
         lint_tasks(known, chosen, accepted=accepted)
-    elif json:
-        print_json(suite_data(known, chosen))
     else:
         show(known, task)
 
@@ -89,19 +84,3 @@ def lint_tasks(suite: Suite, tasks: Sequence[Task], *, accepted: bool) -> None:
     print_text(render(findings, accepted=accepted))
     if any(finding.accepted is None for finding in findings):
         raise SystemExit(1)
-
-
-def suite_data(suite: Suite, tasks: Sequence[Task]) -> dict[str, Any]:
-    """Return some tasks of a suite as JSON data."""
-    entries = [
-        {
-            "task": task.name,
-            "summary": task.summary,
-            "abilities": list(task.abilities),
-            "prompts": list(task.prompts),
-            "worlds": [scenario.world.about for scenario in task.scenarios],
-            "ablation": task.ablation is not None,
-        }
-        for task in tasks
-    ]
-    return {"suite": suite.name, "version": suite.version, "digest": suite.digest, "tasks": entries}

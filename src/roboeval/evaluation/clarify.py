@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -20,10 +19,10 @@ from codebotler.core.files import read_text, to_text, write_whole
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool
 from roboeval.evaluation.engines.engine import Local
-from roboeval.evaluation.generating.requests import add_usage
 from roboeval.evaluation.judging.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion, CompletionKey
 from roboeval.evaluation.runs.folder import RunFolder, evaluation_key
+from roboeval.evaluation.runs.replies import reply_numbers
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import key_of
 from roboeval.suites.load import Suite
@@ -166,10 +165,8 @@ def _trial(
 
 
 def _tokens(some: Sequence[Completion], settings: ClarifySettings) -> float | None:
-    total = Counter(input_tokens=0, output_tokens=0)
-    for one in some:
-        add_usage(total, one.more.get("usage"))
-    return settings.candidates * total.total() / len(some) if total.total() else None
+    counts = [reply_numbers(one)[name] or 0 for one in some for name in ("input_tokens", "output_tokens")]
+    return settings.candidates * sum(counts) / len(some) if any(counts) else None
 
 
 # --- measurements that are stored in a run

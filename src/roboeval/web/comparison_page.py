@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlencode
 
-import polars as pl
 from nicegui import html, ui
 
 from codebotler.core.errors import UserError
@@ -23,7 +22,6 @@ from roboeval.analysis.comparisons.compare import (
     pairs_to_compare,
 )
 from roboeval.analysis.metrics import Estimate
-from roboeval.evaluation.runs.completions import KEY, CompletionKey, name_of
 from roboeval.web.heat_map import MAX_NAME, TaskCells, failure_rows, models_of, run_address
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
@@ -31,9 +29,8 @@ from roboeval.web.snapshot import CompletionFilter, Snapshot
 from roboeval.web.widgets import REFRESH_SECONDS, HeatMap, score_text, show_state
 
 MAX_COMPARED_RUNS = 12
-MAX_PAIR_TASKS, MAX_DIFFERING = 100, 30
+MAX_PAIR_TASKS = 100
 RUNS_IN_PAIR = 2
-DIFFERENCE_HEADS = ("95% confidence interval", "Different verdicts")
 INTERVAL_NOTE = "The interval for all tasks is over tasks; other intervals are over the prompts of a task."
 DIFFERENT_SUITES = (
     "These runs were judged with different suites or versions of a suite. Compare them with care."
@@ -139,18 +136,6 @@ def _draw_run(run: Snapshot) -> None:
 # --- which of two runs is better
 
 
-def _find_differing(first: Snapshot, second: Snapshot) -> dict[str, list[tuple[CompletionKey, bool]]]:
-    """Find the completions that pass in one run only, by task, with True for the second run."""
-    judged = [run.completions.drop_nulls("passed").select(*KEY, "passed") for run in (first, second)]
-    both = judged[0].join(judged[1], on=KEY, how="inner", suffix="_second", maintain_order="left")
-    found: dict[str, list[tuple[CompletionKey, bool]]] = {}
-    for task, prompt, index, _, passed in both.filter(
-        pl.col("passed") != pl.col("passed_second")
-    ).iter_rows():
-        found.setdefault(task, []).append(((task, prompt, index), passed))
-    return found
-
-
 @dataclass(frozen=True)
 class Difference:
     """Which of two judged runs is better, in a sentence and, for a single pair, by task."""
@@ -158,7 +143,6 @@ class Difference:
     runs: tuple[Snapshot, Snapshot]
     sentence: str  # states which run is better, and how significant the difference is
     comparison: Comparison | None = None  # None if it is not shown, or if they have no prompt in common
-    differing: Mapping[str, Sequence[tuple[CompletionKey, bool]]] = field(default_factory=dict)
 
 
 def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
@@ -177,9 +161,7 @@ def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Differen
     sentence = comparison_sentence(found, names)
     if len({has_missions(table) for table in tables}) > 1:
         sentence += f" {MISSIONS_COMPARED[0].upper()}{MISSIONS_COMPARED[1:]}."
-    if not by_task:
-        return Difference((first, second), sentence)
-    return Difference((first, second), sentence, found, _find_differing(first, second))
+    return Difference((first, second), sentence, found if by_task else None)
 
 
 def draw_differences(found: Sequence[Difference]) -> None:
@@ -204,39 +186,19 @@ def _draw_difference(difference: Difference) -> None:
     region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Differences"')
     with region, html.table().classes("differences"):
         with html.thead(), html.tr():
-            for head in ("Task", *names, f"{names[1]} \N{MINUS SIGN} {names[0]}", *DIFFERENCE_HEADS):
+            for head in ("Task", *names, f"{names[1]} \N{MINUS SIGN} {names[0]}", "95% confidence interval"):
                 PlainText("th", head).props("scope=col")
         with html.tbody():
             _draw_row("All tasks", found.first, found.second, found.over_tasks)
             for one in largest:
-                with _draw_row(one.task, one.first, one.second, one.difference):
-                    _draw_differing(difference.differing.get(one.task, ()), difference.runs)
+                _draw_row(one.task, one.first, one.second, one.difference)
     PlainText("p", INTERVAL_NOTE, "quiet")
 
 
-def _draw_row(task: str, first: float, second: float, difference: Estimate) -> html.td:
-    """Draw a row of the table, and return its last cell, which is empty."""
+def _draw_row(task: str, first: float, second: float, difference: Estimate) -> None:
     with html.tr():
         PlainText("th", shortened(task, MAX_NAME)).props("scope=row")
         for share in (first, second):
             PlainText("td", f"{share:.2f}", "number")
         PlainText("td", f"{difference.mean:+.2f}", "number strong")
         PlainText("td", difference.ends("+.2f"), "number")
-        return html.td()
-
-
-def _draw_differing(differing: Sequence[tuple[CompletionKey, bool]], runs: Sequence[Snapshot]) -> None:
-    if not differing:
-        return
-    with html.details():
-        PlainText("summary", f"{len(differing):,}")
-        with ui.element("ul"):
-            for key, is_second in differing[:MAX_DIFFERING]:
-                with ui.element("li"):
-                    PlainText("span", f"{name_of(key)}: ")
-                    verdicts = ("failed", "passed") if is_second else ("passed", "failed")
-                    for run, text in zip(runs, verdicts, strict=True):
-                        link = html.a(f"{shortened(run.name, MAX_NAME)} {text}")
-                        link.props["href"] = outside(f"{run_address(run.name)}/{name_of(key)}")
-            if (left := len(differing) - MAX_DIFFERING) > 0:
-                PlainText("li", f"and {left:,} more")

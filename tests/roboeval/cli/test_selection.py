@@ -20,7 +20,6 @@ def test_a_selection_is_read() -> None:
     ("text", "named"),
     [
         ("Dance", ['"small"', '"Dance"', "Visit, Wait"]),
-        ("Visit/2", ["Visit/2", "0 to 1"]),
         ("Visit/-1", ['"Visit/-1"', "TASK/PROMPT/INDEX"]),
         ("Visit/0/x", ['"Visit/0/x"', "TASK/PROMPT/INDEX"]),
         ("Visit//0", ['"Visit//0"', "TASK/PROMPT/INDEX"]),
@@ -39,6 +38,7 @@ def test_a_wrong_selection_is_explained(text: str, named: list[str]) -> None:
     [
         (("Wait",), "no completion of Wait "),
         (("Visit", 0, 9), "no completion of Visit/0/9 "),
+        (("Visit", 2), "no completion of Visit/2 "),
     ],
 )
 def test_a_selection_without_rows_is_an_error(selection: Selection, named: str) -> None:

@@ -162,7 +162,6 @@ def test_an_equivalent_mutant_is_not_shown_again(small: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (("SayGoodDay,SayGoodNight",), ['"paper"', '"SayGoodNight"']),
         (("SayGoodNight",), ['"paper"', '"SayGoodNight"']),
         (("SayGoodDay", "--worlds", "200"), ["worlds", '"paper"', "by hand"]),
         (("SayGoodDay", "--suite", "plus", "--worlds", "1000000000"), ["invalid value", "'--worlds'"]),

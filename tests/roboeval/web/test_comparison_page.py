@@ -1,4 +1,4 @@
-"""Two runs task by task: the differences of `roboeval compare`, and the completions behind them."""
+"""Two runs task by task: the differences of `roboeval compare`."""
 
 from __future__ import annotations
 
@@ -35,14 +35,6 @@ def test_differences_are_those_of_compare(tmp_path: Path) -> None:
     for row in rows:
         assert row.second - row.first == pytest.approx(row.difference.mean)
         assert row.difference.low <= row.difference.mean <= row.difference.high
-        passed = [
-            {r[:3]: r[3] for r in run.completions.select("task", "prompt", "index", "passed").iter_rows()}
-            for run in (first, second)
-        ]
-        both = [key for key in passed[0] if key[0] == row.task and key in passed[1]]
-        expected = {key: passed[1][key] for key in both if passed[0][key] != passed[1][key]}
-        assert dict(one.differing[row.task]) == expected
-        assert expected
     assert one.comparison.over_tasks.mean == pytest.approx(compared["difference"])
     assert one.sentence.startswith("careful is better than hasty by ")
     three = differences_of([first, second, first])

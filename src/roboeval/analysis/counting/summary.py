@@ -35,7 +35,7 @@ class EvaluationSummary:
     overall: tuple[Estimate, ...]  # pass@k for each value of k
     failures: tuple[Failures, ...]
     scope: JudgingScope
-    missing: Mapping[str, Sequence[str]]  # tasks of the suite without a score, by reason
+    missing: tuple[str, ...]  # tasks of the suite without a score
     ablated: bool = False  # judged by common-sense requirements only
 
     @property
@@ -68,17 +68,8 @@ def summarise(
         raise UserError(f"{error}; choose k from 1 to {fewest}") from None
     scored = {score.task for score in tasks}
     expected = [n for n, task in suite.tasks.items() if task.ablation is not None or not ablated]
-    missing = _missing([name for name in expected if name not in scored], scope)
+    missing = tuple(name for name in expected if name not in scored)
     return EvaluationSummary(tuple(k), tasks, estimates, failures(tally), scope, missing, ablated)
-
-
-def _missing(tasks: Sequence[str], scope: JudgingScope) -> dict[str, list[str]]:
-    selected = [task for task in tasks if scope.selects(task)]
-    return {
-        "no_completions": [task for task in selected if not scope.completions.get(task)],
-        "not_judged": [task for task in selected if scope.completions.get(task)],
-        "not_selected": [task for task in tasks if not scope.selects(task)],
-    }
 
 
 def failures(tally: Tally) -> tuple[Failures, ...]:

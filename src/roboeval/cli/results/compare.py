@@ -123,10 +123,6 @@ def resample(
     retries: Annotated[
         list[int] | None, typer.Option(min=0, help="Maximum number of retries; may be given several times.")
     ] = None,
-    samples: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Number of imagined worlds for each check.")
-    ] = 5,
-    seed: Annotated[int, typer.Option(help="The random seed of the imagined worlds.")] = 0,
     suite: SuiteOption = "paper",
     workers: WorkersOption = None,
     engine: EngineOption = "local",
@@ -148,39 +144,32 @@ def resample(
         if has_missions(results.table):
             fail(f"{run}: holds missions of an agent, which cannot be checked; name a run of programs")
         checker = engine_for(len(results.places))
-        prompts = count_by_prompt(check_run(results, samples=samples, seed=seed, engine=checker))
+        prompts = count_by_prompt(check_run(results, checker))
     coverage = results.coverage
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
-        of = {"suite": results.manifest["suite"], "samples": samples, "seed": seed, **asdict(coverage)}
+        of = {"suite": results.manifest["suite"], **asdict(coverage)}
         print_json({**of, **curve_data(prompts, limits)})
     else:
         print_rich(resample_view(prompts, limits, title=str(run), coverage=coverage))
 
 
-def check_run(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
+def check_run(results: Results, engine: OpenEngine) -> pl.DataFrame:
     """Check the programs of a run, save the results, and return the run's table with them in `accepted`."""
     from roboeval.evaluation.runs.table import with_answers
 
     completions = [results.completions[key] for key in results.places]
     judged = [one for one in completions if one.acted is None]  # an agent's mission holds in one world only
-    suite = results.known_suite
-    problems = check_completions(results.run, suite, judged, engine, samples=samples, seed=seed)
+    problems = check_completions(results.run, results.known_suite, judged, engine)
     return with_answers(results.table, problems)
 
 
 def check_completions(
-    run: RunFolder,
-    suite: Suite,
-    completions: Collection[Completion],
-    engine: OpenEngine,
-    *,
-    samples: int = 5,
-    seed: int = 0,
+    run: RunFolder, suite: Suite, completions: Collection[Completion], engine: OpenEngine
 ) -> dict[tuple[str, str], list[str]]:
     """Check programs, save the results in their run, and return the problems by task and program hash."""
     from roboeval.evaluation.generating.checks import check_programs
 
     different = {(one.task, one.program_sha256) for one in completions}
-    checking = check_programs(run, suite, completions, engine, samples=samples, seed=seed)
+    checking = check_programs(run, suite, completions, engine)
     return dict(show_progress(checking, "checking", len(different)))

@@ -105,7 +105,7 @@ def judged_run(
     if engine is None:
         table = results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))
     else:
-        table = check_run(results, engine=engine)
+        table = check_run(results, engine)
     if beside is not None:
         other = open_current(run.path, beside, ablated=False, reuse_from=results)
     if rules is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -38,7 +38,9 @@ def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
         head.append(" (ablation: only common sense was required)", style="not bold")
     n, failed = summary.judged, sum(each.count for each in summary.failures)
     parts: list[RenderableType] = [head, Text(), _task_table(summary), Text()]
-    parts += [*_overall(summary), *_missed(summary.missing)]
+    parts += _overall(summary)
+    if summary.missing:
+        parts.append(Text(f"no results for {counted(len(summary.missing), 'task')}", style="dim"))
     if (warning := summary.scope.cut_off_warning) is not None:
         parts.append(Text(warning, style="yellow"))
     if failed:
@@ -64,19 +66,6 @@ def house_view(found: BrokenRules) -> RenderableType:
         less = f"pass@1 with the rules minus pass@1 without: {found.cost.mean:+.3f}"
         parts.append(Text(f"{less} ({found.cost.interval})"))
     return Group(*parts)
-
-
-MISSING_REASONS = {
-    "no_completions": "no completions for",
-    "not_judged": "not judged yet:",
-    "not_selected": "not selected:",
-}
-
-
-def _missed(missing: Mapping[str, Sequence[str]]) -> Iterator[Text]:
-    for reason, tasks in missing.items():
-        if tasks:
-            yield Text(f"{MISSING_REASONS[reason]} {counted(len(tasks), 'task')}", style="dim")
 
 
 def _task_table(summary: EvaluationSummary) -> Table:

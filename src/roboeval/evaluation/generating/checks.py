@@ -24,23 +24,18 @@ ProgramKey: TypeAlias = tuple[str, str]  # the name of a task and the hash of a 
 
 
 def check_programs(
-    run: RunFolder,
-    suite: Suite,
-    completions: Iterable[Completion],
-    engine: OpenEngine,
-    *,
-    samples: int,
-    seed: int,
+    run: RunFolder, suite: Suite, completions: Iterable[Completion], engine: OpenEngine
 ) -> Iterator[tuple[ProgramKey, list[str]]]:
-    """Yield the problems of each program, and check only programs not yet checked with these settings.
+    """Yield the problems of each program, and check only programs that are not checked yet.
 
     The check uses the rooms of the task's first world and the suite's house rules.
     """
+    settings = CheckSettings(simulation=suite.settings, skills=suite.skills, house_rules=suite.house_rules)
     metadata = {
         "suite": suite.name,
         "digest": suite.digest,
-        "samples": samples,
-        "seed": seed,
+        "samples": settings.samples,
+        "seed": settings.seed,
         "codebotler": __version__,
         "python": PYTHON_VERSION,
     }
@@ -57,13 +52,6 @@ def check_programs(
         if not new:
             return
         plans = {task.name: RoomMap.of(task.scenarios[0].world) for task in suite.tasks.values()}
-        settings = CheckSettings(
-            samples=samples,
-            seed=seed,
-            simulation=suite.settings,
-            skills=suite.skills,
-            house_rules=suite.house_rules,
-        )
         check = partial(_check, plans, settings)
         works = ((task, program) for (task, _), program in new.items())
         with engine as opened:

@@ -14,13 +14,7 @@ from codebotler.core.files import MAX_ROW, Appender, to_line, to_text, write_who
 from codebotler.models.base import BudgetSpentError, Model, ModelError, Reply, Usage, make_reply
 from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import Prompt
-from roboeval.evaluation.generating.requests import (
-    GenerationPlan,
-    RequestLog,
-    add_usage,
-    begin_batch,
-    no_usage,
-)
+from roboeval.evaluation.generating.requests import GenerationPlan, RequestLog, begin_batch
 from roboeval.evaluation.runs.completions import CompletionKey, how_many
 from roboeval.evaluation.runs.endings import SERVER_REJECTED
 from roboeval.evaluation.runs.folder import RunFolder
@@ -45,8 +39,8 @@ class GenerationProgress:
     total: int
     found: int  # completions present at the start
     interrupted: int  # requests pending at the last interruption, which may be billed twice
-    usage: Counter[str] = field(default_factory=no_usage)  # token counts of the new completions
-    failures: dict[CompletionKey, str] = field(default_factory=dict)  # error messages of failed requests
+    usage: Counter[str] = field(default_factory=Counter)  # token counts of the new completions
+    failures: dict[CompletionKey, ModelError] = field(default_factory=dict)  # of requests without a row
     stopped: str | None = None  # why generation stopped early
 
     def __post_init__(self) -> None:
@@ -56,7 +50,8 @@ class GenerationProgress:
     def missing(self) -> str | None:
         """Return a sentence such as "3 completions are missing: timed out", or None if all is well."""
         left = self.total - self.done
-        reason = self.stopped or next(iter(self.failures.values()), "they were not requested")
+        failed = (error.sentence for error in self.failures.values())
+        reason = self.stopped or next(failed, "they were not requested")
         return f"{how_many(left)} {'is' if left == 1 else 'are'} missing: {reason}" if left else self.stopped
 
 
@@ -113,7 +108,6 @@ class _Generation:
     error: ModelError | None = None
     _failures_in_a_row: int = 0
     _budget: int | None = None  # tokens used when the budget ran out
-    _refused: dict[CompletionKey, ModelError] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._paced = RateLimited(self.model, **asdict(self.pace))
@@ -146,10 +140,7 @@ class _Generation:
             self._budget, self.progress.stopped = error.budget, error.sentence
         except ModelError as error:
             self.log.ended(key)
-            self.error = error
-            self.progress.failures[key] = error.sentence
-            if error.is_refusal:
-                self._refused[key] = error
+            self.error = self.progress.failures[key] = error
             self._count_failure()
 
     def _count_failure(self) -> None:
@@ -194,7 +185,8 @@ class _Generation:
         try:
             await asyncio.to_thread(self.file.sync)
         finally:  # also after an interrupt, because closing the file syncs it to disk
-            add_usage(self.progress.usage, row["usage"])
+            for name in ("input_tokens", "output_tokens"):
+                self.progress.usage[name] += row["usage"][name] or 0
             self.progress.done += 1
         if row.get("ending") == SERVER_REJECTED:
             self._count_failure()
@@ -204,10 +196,10 @@ class _Generation:
 
     async def _keep_refused(self) -> None:
         # The server accepted other requests, so these were refused because of their content.
-        for key, error in self._refused.items():
+        refused = {key: error for key, error in self.progress.failures.items() if error.is_refusal}
+        for key, error in refused.items():
             replies = [*self._earlier(key), reply_of_refusal(error)]
             row = await self.plan.complete(key, self.model.name, partial(self._ask, key), replies)
             self.file.append(to_line(row))
             del self.progress.failures[key]
             self.progress.done += 1
-        self._refused.clear()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import platform
-from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
@@ -129,17 +128,6 @@ class RoundPlan(GenerationPlan):
     def folder(self, run: RunFolder) -> RunFolder:
         """Return the run of this round, a subfolder of the first run."""
         return RunFolder(run.path / f"{'repair' if self.repairs else 'retry'}-{self.number}")
-
-
-def no_usage() -> Counter[str]:
-    """Return token counts of zero."""
-    return Counter(input_tokens=0, output_tokens=0)
-
-
-def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> None:
-    """Add the token counts of a row to `total`. A count that is missing or null adds nothing."""
-    for name in total:
-        total[name] += (usage or {}).get(name) or 0
 
 
 def begin_batch(
