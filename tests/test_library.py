@@ -364,13 +364,13 @@ def test_type_checker_finds_mistakes(right: str, wrong: str, found: str, mypy_fo
     assert found in ended.stdout
 
 
-def test_completions_are_read_from_a_file() -> None:
+def test_missing_file_of_completions_is_refused() -> None:
     with pytest.raises(codebotler.UserError, match="No such file") as error:
         next(roboeval.read_completions("x.jsonl"))
     assert str(error.value.file) == "x.jsonl"
 
 
-def test_a_suite_is_named_by_its_folder(tmp_path: Path) -> None:
+def test_folder_without_a_suite_is_refused(tmp_path: Path) -> None:
     with pytest.raises(codebotler.UserError, match=f'"{tmp_path}"'):
         roboeval.load_suite(tmp_path)
 

@@ -406,7 +406,6 @@ def test_hostile_text_stays_text(small_run: Path, tmp_path: Path, open_page: Ope
             row["failure"] |= {"class": whole[:300], "kind": whole[:300], "check": check}
 
     rewrite_run(run, make_evil)
-    head = json.loads(run.manifest("paper").read_text())
     shutil.copy(run.rows("paper"), run.rows(name))
     shutil.copy(run.manifest("paper"), run.manifest(name))
     with serve_runs(run.path.parent) as server:
@@ -434,7 +433,6 @@ def test_hostile_text_stays_text(small_run: Path, tmp_path: Path, open_page: Ope
             expect(page.locator(".heat td").first).to_be_visible()
             expect_unharmed(page, count)
             page.context.close()
-    assert head["suite"] == "paper"
 
 
 def escape_invisible(text: str) -> str:

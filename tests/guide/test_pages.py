@@ -366,6 +366,7 @@ def test_task_of_the_guide_becomes_a_package(
     reader = follow(page)
     assert "an umbrella is in the lobby" in reader.printed[-1]
     assert not (reader.folder / "office").exists()
+    assert (reader.folder / "site" / "office_suite" / "suite.yaml").is_file()
     judged = next(printed for printed in reader.printed if "FetchUmbrella/1/0" in printed)
     assert "there is only a chair in the lobby" in judged
 

@@ -107,8 +107,9 @@ def test_no_result_is_lost_when_a_server_connects_late(graph: Graph) -> None:
     graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
-    graph.serve(SAY, KNOWS_LATE="0.1")
+    server = graph.serve(SAY, KNOWS_LATE="0.1")
     robot.perform("say", ["hello"])
+    server.expect("goal", "hello")
 
 
 def test_server_with_another_definition_is_reported(graph: Graph) -> None:

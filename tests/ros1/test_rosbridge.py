@@ -73,9 +73,10 @@ def test_goal_is_executed_and_the_result_comes_back(graph: Graph, whole_double: 
 
 
 def test_no_result_is_lost_when_a_server_connects_late(graph: Graph, robot: RosRobot) -> None:
-    graph.serve(SAY, KNOWS_LATE="1.0")
+    server = graph.serve(SAY, KNOWS_LATE="1.0")
     robot.connect()
     robot.perform("say", ["hello"])
+    server.expect("goal", "hello")
 
 
 def test_final_status_is_that_of_the_result(graph: Graph, robot: RosRobot) -> None:

@@ -58,7 +58,7 @@ def test_it_acts_on_the_graph_like_the_simulated_robot(graph: Graph) -> None:
     assert str(error.value) == 'the robot holds "mug" and cannot pick up "mug" as well'
 
 
-def test_it_stops_and_goes_on_where_it_was(graph: Graph) -> None:
+def test_it_stops_and_then_performs_the_next_skill(graph: Graph) -> None:
     virtual = VirtualRobot(WORLD, speed=1.0, address=graph.uri)
     virtual.start()
     robot = graph.robot(skills=SKILLS)

@@ -22,7 +22,7 @@ from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
 from ros2_scene import ROS2_PYTHON, Scene, installed
-from ros_graph import GO_TO, SAY, run_in_thread
+from ros_graph import GO_TO, LONG, SAY, run_in_thread
 
 
 @pytest.mark.smoke
@@ -298,11 +298,14 @@ def test_text_that_no_message_can_hold_is_reported(scene: Scene) -> None:
 
 
 def test_many_goals_in_a_row_and_none_is_lost(scene: Scene) -> None:
-    scene.serve(GO_TO)
+    server = scene.serve(GO_TO)
     robot = scene.robot()
     robot.connect()
     for number in range(200):
         robot.perform("go_to", [str(number)])
+    assert [server.events.get(timeout=LONG) for _ in range(200)] == [
+        ["goal", str(number)] for number in range(200)
+    ]
 
 
 def test_address_is_a_domain() -> None:

@@ -1039,7 +1039,7 @@ def test_a_person_chooses_a_behaviour_in_the_dialog(
         if program:
             found = await agent.call("choose_behaviour")
             assert (found["state"], found["check"]["program"]) == ("checked", program)
-            assert session_of(made).is_changed_by_person == bool(content and content.get("more"))
+            assert not session_of(made).is_changed_by_person
         else:
             await agent.fails("choose_behaviour")
             assert view_of(made).waits_for_answer
@@ -1095,7 +1095,7 @@ def test_a_client_that_reads_no_progress_does_not_block_its_call(
         call = agent.client.call_tool(
             "run_mission", {"digest": proposed["digest"]}, progress_callback=never_read
         )
-        await asyncio.wait_for(call, 10)
+        assert not (await asyncio.wait_for(call, 10)).is_error
 
     use(gatekeeper, act)
 

@@ -88,6 +88,7 @@ def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_pa
         assert view.question is not None
         assert view.question.why_last
         assert view.instruction == "Do it. But quietly."
+        assert session.is_changed_by_person
         assert model.prompts[-1].instruction == "Do it. But quietly."
         session.answer(session.view.question, "none", "And fast.")
         view = session.wait_until(lambda now: now.is_over or now.state is MissionState.FAILED)

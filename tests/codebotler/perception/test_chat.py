@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
@@ -233,9 +234,8 @@ def test_model_that_accepts_no_pictures_is_refused(name: str, sentence: str) -> 
         open_detector(name)
 
 
-def test_detector_without_its_libraries_says_what_to_install() -> None:
-    try:
-        import transformers  # noqa: F401, PLC0415 - whether it can be imported
-    except ImportError:
-        with pytest.raises(UserError, match=r"codebotler\[transformers\]"):
-            open_detector("hf:owl")
+def test_detector_without_its_libraries_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "transformers", None)  # as if it were not installed
+    monkeypatch.delitem(sys.modules, "codebotler.perception.zeroshot", raising=False)
+    with pytest.raises(UserError, match=r"codebotler\[transformers\]"):
+        open_detector("hf:owl")

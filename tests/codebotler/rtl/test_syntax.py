@@ -2,9 +2,10 @@
 
 import pickle
 import re
+import unicodedata
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
@@ -105,7 +106,8 @@ def test_strange_texts_survive_printing(strange_formulas: SearchStrategy[Formula
 
 
 @pytest.mark.filterwarnings("ignore::FutureWarning")
-@given(st.text(max_size=8).map(lambda text: text.replace("\b", "")))
+@example(r"a\\d")
+@given(st.text(max_size=8).map(lambda text: unicodedata.normalize("NFC", text.replace("\b", ""))))
 def test_raw_patterns_survive_printing(pattern: str) -> None:
     try:
         re.compile(pattern)

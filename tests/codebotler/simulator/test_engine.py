@@ -604,16 +604,11 @@ def test_suite_sets_the_limits() -> None:
 
 
 @pytest.mark.shared_engine
-def test_enormous_program_is_refused_unread() -> None:
+def test_enormous_program_is_refused() -> None:
     (outcome,) = run([("#" * 6_000_000, WORLD)], workers=1)
     assert (outcome.status, outcome.trace) == (Status.PYTHON_ERROR, ())
     assert outcome.error is not None
     assert "longer than 5,000,000 characters" in outcome.error.message
-
-
-@pytest.mark.shared_engine
-def test_isolation_can_be_required() -> None:
-    assert len(list(run([(saying("a"), WORLD)], workers=1, require_isolation=True))) == 1
 
 
 @pytest.mark.slow

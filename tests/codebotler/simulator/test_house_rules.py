@@ -672,3 +672,6 @@ def test_no_backdoor_bypasses_a_rule(fork_worker: Worker, path: Path) -> None:
     program = path.read_text().replace("@", "x")
     outcome = run(fork_worker, program, [rule('not tr.Exists(goto(".*")) and not tr.Exists(say(".*"))')])
     assert not [event for event in outcome.trace if event.kind in {"goto", "say"}]
+    if "\n# does: " in program:  # without the rule, it would go somewhere or speak
+        assert outcome.error is not None
+        assert outcome.error.kind == "RuleViolation"

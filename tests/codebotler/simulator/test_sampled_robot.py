@@ -292,7 +292,9 @@ def test_search_in_vain_excuses_the_failures_that_follow() -> None:
     assert len(robot.excuses) == 1
     assert failure(robot, "place", "cup") == "PlaceNoObject"
     assert len(robot.excuses) == 1
-    assert failure(search_rooms("alice", in_kitchen=False, in_lab=False), "ask", "alice", "Tea?", YES_NO)
+    robot = search_rooms("alice", in_kitchen=False, in_lab=False)
+    assert failure(robot, "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
+    assert len(robot.excuses) == 1
 
 
 def test_single_look_in_vain_excuses_nothing() -> None:

@@ -93,6 +93,8 @@ def test_prompts_have_ten_rules(suite: Suite) -> None:
 def test_all_robots_start_in_the_room_that_a_rule_names(suite: Suite) -> None:
     starts = {scenario.world.robot for task in suite.tasks.values() for scenario in task.scenarios}
     assert starts == {"start_loc"}
+    assert suite.house is not None
+    assert any('at("start_loc"' in str(rule.formula) for rule in suite.house.rules)
 
 
 def test_programs_end_as_declared(programs: list[JudgedProgram]) -> None:

@@ -1,5 +1,7 @@
 """Claims of texts: numbers of things, times of day, affirmations and denials."""
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -332,9 +334,8 @@ def test_at_matches_only_events_in_that_room() -> None:
     ],
 )
 def test_error_names_the_mistake(text: str, problem: str) -> None:
-    with pytest.raises(RtlSyntaxError, match=None) as error:
+    with pytest.raises(RtlSyntaxError, match=re.escape(problem)):
         parse(text)
-    assert problem in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -347,5 +348,5 @@ def test_error_names_the_mistake(text: str, problem: str) -> None:
     ],
 )
 def test_printed_formula_can_be_parsed_again(text: str) -> None:
-    assert str(parse(text)) == text.replace('r"mugs\\b"', 'r"mugs\\b"')
+    assert str(parse(text)) == text
     assert parse(str(parse(text))) == parse(text)
