@@ -15,14 +15,7 @@ from codebotler.cli.programs.check import check_view, contract_view, read_progra
 from codebotler.cli.programs.generate import ADD_SENTENCE, ask_which, note_programless
 from codebotler.cli.views import EventPrinter, continue_view, ending_view, source_view
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import (
-    busy,
-    confirm,
-    note,
-    print_rich,
-    read_line,
-    shortened,
-)
+from codebotler.core.terminal import busy, confirm, note, print_rich, read_line, shortened
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.mission import STOP_GRACE_SECONDS, MissionError
 from codebotler.missions.recovery import PriorApproval, ask_evidence, past_to_recover
