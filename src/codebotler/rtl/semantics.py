@@ -60,7 +60,7 @@ def _test_holds(test: formulas.Test, trace: Trace) -> bool:
             return at_least(element, number, trace, positions_in_scopes(test.scopes, trace)) == number
         case formulas.Count(element, number):
             return at_least(element, number + 1, trace, positions_in_scopes(test.scopes, trace)) == number
-    return first(test.element, trace, positions(test, trace)) is not None
+    return next(occurrences(test.element, trace, positions(test, trace)), None) is not None
 
 
 def positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
@@ -119,11 +119,6 @@ def occurrences(element: formulas.EventPattern, trace: Trace, span: Iterable[int
         event = trace[at]
         if event.kind == kind and is_match(element, event, at):
             yield at
-
-
-def first(element: formulas.EventPattern, trace: Trace, span: Iterable[int]) -> int | None:
-    """Return the position of the first matching event in a span, or None."""
-    return next(occurrences(element, trace, span), None)
 
 
 def at_least(element: formulas.EventPattern, number: int, trace: Trace, span: range) -> int:
