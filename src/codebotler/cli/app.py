@@ -20,7 +20,7 @@ from codebotler.cli.operating.commands import (
     virtual_robot,
 )
 from codebotler.cli.operating.mcp import serve_agents
-from codebotler.core.terminal import note, report_problems
+from codebotler.core.terminal import is_interactive, note, read_line, report_problems
 
 
 @inherit_options(model_settings)
@@ -71,7 +71,8 @@ def generate(
     with suggesting_here(room_map):
         if candidates > 1:
             given = (lambda: open_model(chosen.name, settings)), make_prompt, instruction, how, room_map
-            program = programs.choose_candidate(*given, count=candidates, ask=programs.line_reader())
+            ask = read_line if is_interactive() else None
+            program = programs.choose_candidate(*given, count=candidates, ask=ask)
             accepted = program is not None and programs.print_checked(program, how, room_map)
         else:
             tries, prompt = int(repair) if retries is None else retries, make_prompt(instruction)

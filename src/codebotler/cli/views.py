@@ -17,6 +17,7 @@ from codebotler.missions.display.wording import event_text, timeline, title
 from codebotler.missions.storage.log import LogLine, MissionState, MissionSummary
 from codebotler.missions.storage.store import last_rest, rest_text, rests_in
 from codebotler.models.open import ChosenModel
+from codebotler.models.recorded import is_recorded
 from codebotler.models.usable import MODEL_HINT, UsableModel
 from codebotler.robots.base import Readiness
 
@@ -159,7 +160,7 @@ def models_view(models: Sequence[UsableModel], chosen: ChosenModel) -> Group:
     for model in models:
         table.add_row(Text(model.options, "bold"), Text(model.why, "dim"))
     lines = [f"default model: {visible(chosen.name)}"]
-    if all(model.is_recorded for model in models):
+    if all(is_recorded(model.name) for model in models):
         lines.append(f"for other instructions, {MODEL_HINT}")
     return Group(table, Text(), *map(Text, lines))
 

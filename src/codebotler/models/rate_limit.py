@@ -18,14 +18,7 @@ from tenacity import (
 )
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import (
-    BudgetSpentError,
-    Model,
-    ModelError,
-    Reply,
-    TextListener,
-    ignore_text,
-)
+from codebotler.models.base import BudgetSpentError, Model, ModelError, Reply, TextListener, ignore_text
 from codebotler.prompts import Prompt
 
 MODELS_LOG = logging.getLogger("codebotler.models")

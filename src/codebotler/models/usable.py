@@ -36,11 +36,6 @@ class UsableModel:
     base_url: str | None = None  # the value for `--base-url`; None if not needed
 
     @property
-    def is_recorded(self) -> bool:
-        """Whether this is a recorded model, not a language model."""
-        return is_recorded(self.name)
-
-    @property
     def options(self) -> str:
         """The command-line options that select this model, quoted for a shell."""
         server = "" if self.base_url is None else f" --base-url {self.base_url}"
@@ -61,7 +56,7 @@ def find_usable_models(servers: Mapping[str, int] = MODEL_SERVERS) -> list[Usabl
 def suggest_model(servers: Mapping[str, int] = MODEL_SERVERS) -> str:
     """Return the options that select the first usable model, or else how to set up a model."""
     first = find_usable_models(servers)[0]
-    return MODEL_HINT if first.is_recorded else f"add {first.options}"
+    return MODEL_HINT if is_recorded(first.name) else f"add {first.options}"
 
 
 def _list_models(server: str, port: int) -> list[UsableModel]:

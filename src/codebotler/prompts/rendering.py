@@ -67,12 +67,7 @@ class Prompt:
 
     def after(self, program: str, problems: Sequence[str]) -> Prompt:
         """Return a request to rewrite a program without these problems, each given in a sentence."""
-        listed = list_lines(problems)
-        repair = fill_template("repair", problems=listed)
-        text = fill_template(
-            "completion-repair", program=_comment(program), problems=_comment(listed), opening=self.opening
-        )
-        return self._followed(program, repair, text)
+        return self._followed("repair", program, problems=list_lines(problems))
 
     def to_continue(self, program: str, steps: Sequence[str], why: str, here: str, last_step: str) -> Prompt:
         """Return a request to write the rest of a mission that ended early.
@@ -84,26 +79,17 @@ class Prompt:
             here: where the robot is and what it holds, in a sentence.
             last_step: the last of the steps that did not fail; empty if there is none.
         """
-        listed = list_lines(steps or [NO_STEP])
-        request = fill_template("continue", steps=listed, why=why, here=here)
-        text = fill_template(
-            "completion-continue",
-            program=_comment(program),
-            steps=_comment(listed),
-            why=why,
-            here=here,
-            opening=self.opening,
-        )
-        return replace(self._followed(program, request, text), last_step=last_step or NO_STEP)
+        done = list_lines(steps or [NO_STEP])
+        followed = self._followed("continue", program, steps=done, why=why, here=here)
+        return replace(followed, last_step=last_step or NO_STEP)
 
-    def _followed(self, program: str, request: str, text: str) -> Prompt:
-        """Return this prompt with a program and a further request: `text` is both for base models."""
+    def _followed(self, name: str, program: str, **values: str) -> Prompt:
+        """Return this prompt with a program and the request `name`, which base models read as comments."""
         answer = PromptMessage("assistant", _fence(program))
-        return replace(
-            self,
-            messages=(*self.messages, answer, PromptMessage("user", request)),
-            text=self.text.removesuffix(self.opening) + text + "\n",
-        )
+        request = PromptMessage("user", fill_template(name, **values))
+        comments = _comment(fill_template(f"completion-{name}", program=program.rstrip("\n"), **values))
+        text = f"{self.text.removesuffix(self.opening)}{comments}\n{self.opening}"
+        return replace(self, messages=(*self.messages, answer, request), text=text)
 
     def after_no_program(self, why: str) -> Prompt:
         """Return this request with the reason why the last reply had no program. Only chat models see it."""

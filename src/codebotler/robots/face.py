@@ -136,19 +136,10 @@ class Face:
         with self._lock:
             question = self.shown.question
             if question is None or question.number != number:
-                raise AnswerError(self._too_late(number))
+                raise AnswerError("that question is closed: it was answered or withdrawn, or its time is up")
             if not 0 <= option < len(question.options):
                 raise AnswerError("the answer is not one of the options; choose one from the list")
             self._end("answered", option)
-
-    def _too_late(self, number: int) -> str:
-        ended = self.shown.ended
-        if ended is None or ended.number != number:
-            return "that question is closed"
-        if ended.answer is not None:
-            return f'the question was already answered: "{ended.options[ended.answer]}"'
-        why = "it was withdrawn" if ended.how == "withdrawn" else "its time is up"
-        return f"that question is closed: {why}"
 
     def _next(self) -> int:
         if not self._is_open:

@@ -209,6 +209,12 @@ class _ActAtPlace:
 class ActAtFirst(_ActAtPlace):
     """Holds if a matching event occurs during the first stay at a place."""
 
+    @cached_property
+    def stay(self) -> tuple[Scope, ...]:
+        """The scopes that contain the first stay only."""
+        bounds = Scope("OnlyAfterFirst", self.arrival), Scope("BeforeFirst", self.departure)
+        return (*self.scopes, *bounds)
+
 
 class ActAtSome(_ActAtPlace):
     """Holds if a matching event occurs during any stay at a place."""

@@ -6,14 +6,13 @@ from functools import lru_cache
 from itertools import product
 from typing import Any
 
-from codebotler.core.text.words import brief, listed
+from codebotler.core.text.words import brief, elide_list, listed
 from codebotler.rtl.pattern import Tree, parse_tree
 
 MATCH_ALL_PATTERNS = frozenset({"", ".*", ".+", "^.*$"})
 UNCLEAR = "(…)"
 _MAX_TEXTS = 40  # for each regex
 _MIN_RANGE = 3  # longer sequences of numbers are shown as a range
-_MAX_SHOWN = 5
 
 
 @lru_cache(maxsize=4096)
@@ -39,9 +38,7 @@ def choices(pattern: str) -> tuple[str, ...] | None:
 
 def one_of(texts: tuple[str, ...]) -> str:
     """Join alternatives, such as `"bread" or "toast"`. After the fifth, give only the number of the rest."""
-    left = len(texts) - _MAX_SHOWN
-    shown = [f'"{brief(text)}"' for text in texts[: _MAX_SHOWN if left > 1 else None]]
-    return listed([*shown, f"{left} more"] if left > 1 else shown, "or")
+    return listed(elide_list([f'"{brief(text)}"' for text in texts]), "or")
 
 
 def first_choice(pattern: str) -> str:

@@ -60,20 +60,15 @@ def _test_holds(test: formulas.Test, trace: Trace) -> bool:
             return at_least(element, number, trace, positions_in_scopes(test.scopes, trace)) == number
         case formulas.Count(element, number):
             return at_least(element, number + 1, trace, positions_in_scopes(test.scopes, trace)) == number
-    return first(test.element, trace, positions(test, trace)) is not None
+    return next(occurrences(test.element, trace, positions(test, trace)), None) is not None
 
 
 def positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
     """Return the positions where a matching event makes a test hold, such as only the last one for `Last`."""
-    span = positions_in_scopes(test.scopes, trace)
-    match test:
-        case formulas.Exists():
-            return span
-        case formulas.Last():
-            return span[-1:]
-        case formulas.ActAtSome():
-            return during_stays(test, trace, span)
-    return first_stay(test, trace, span) or ()
+    span = positions_in_scopes(test.stay if isinstance(test, formulas.ActAtFirst) else test.scopes, trace)
+    if isinstance(test, formulas.ActAtSome):
+        return during_stays(test, trace, span)
+    return span[-1:] if isinstance(test, formulas.Last) else span
 
 
 def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
@@ -126,11 +121,6 @@ def occurrences(element: formulas.EventPattern, trace: Trace, span: Iterable[int
             yield at
 
 
-def first(element: formulas.EventPattern, trace: Trace, span: Iterable[int]) -> int | None:
-    """Return the position of the first matching event in a span, or None."""
-    return next(occurrences(element, trace, span), None)
-
-
 def at_least(element: formulas.EventPattern, number: int, trace: Trace, span: range) -> int:
     """Count the matching events in a span, up to `number`."""
     return sum(1 for _ in islice(occurrences(element, trace, span), min(number, len(span))))
@@ -157,17 +147,7 @@ def narrow(scope: formulas.Scope, at: int | None, span: range) -> range:
     return range(span.start, at) if scope.is_before else range(at + 1, span.stop)
 
 
-def first_stay(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, span: range) -> range | None:
-    """Return the positions between the first arrival at a test's place and the next departure."""
-    arrival = first(test.arrival, trace, span)
-    if arrival is None:
-        return None
-    after = range(arrival + 1, span.stop)
-    departure = first(test.departure, trace, after)
-    return after if departure is None else range(arrival + 1, departure)
-
-
-def during_stays(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, span: range) -> Iterator[int]:
+def during_stays(test: formulas.ActAtSome, trace: Trace, span: range) -> Iterator[int]:
     """Yield the positions during all stays at a test's place.
 
     A stay excludes the move that ends it. The move that begins it counts only as part of an earlier stay.

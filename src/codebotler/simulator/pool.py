@@ -7,7 +7,6 @@ import contextlib
 import logging
 import os
 import pickle
-import sys
 import tempfile
 import threading
 from collections import deque
@@ -22,7 +21,6 @@ from codebotler.simulator.worker import EngineError, Worker
 
 _log = logging.getLogger("codebotler.engine")
 NO_SECCOMP = "programs are less isolated here: the kernel does not allow system call filters (seccomp)"
-WINDOWS_UNSUPPORTED = "programs run on Linux and macOS only; on Windows, use WSL"
 
 RESULTS_IN_MEMORY = 8_000_000  # bytes of results, before they move to a file
 UNREADABLE_KEY = b""  # the name for a key that raised an error
@@ -48,8 +46,6 @@ class WorkerPool:
     def __init__(
         self, workers: int, *, require_isolation: bool = False, one_process_per_run: bool = False
     ) -> None:
-        if sys.platform == "win32":
-            raise EngineError(WINDOWS_UNSUPPORTED)
         self.workers = workers
         self._local = threading.local()
         self._threads = ThreadPoolExecutor(

@@ -194,7 +194,6 @@ def test_unusable_input_is_refused_in_one_sentence(files: Path) -> None:
         assert refusal.at == (str(path), None)
         assert fault in refusal.sentence
     assert refusal_of("check", "fetch me a mug").sentence.startswith("fetch me a mug: ")
-    assert "- for standard input" in refusal_of("check", "").sentence
     assert "standard input: " in refusal_of("check", "-", given=" \n").sentence
     (files / "empty.py").write_text("\n")
     refusal = refusal_of("check", files / "empty.py")

@@ -7,7 +7,7 @@ import pytest
 
 import command_line
 from codebotler.checking.sampled import CheckSettings
-from codebotler.cli.programs.generate import choose_candidate, line_reader
+from codebotler.cli.programs.generate import choose_candidate
 from codebotler.core.errors import UserError
 from codebotler.models.recorded import open_recorded
 from codebotler.prompts import prompt_for
@@ -111,10 +111,6 @@ def test_end_of_input_is_not_an_answer() -> None:
 def test_replies_without_a_program_do_not_count() -> None:
     assert Terminal(["", "", ONE]).choose() == ONE
     assert Terminal(["", ""]).choose() is None
-
-
-def test_nobody_is_asked_without_a_terminal() -> None:
-    assert line_reader() is None
 
 
 def codebotler(*words: str, cwd: Path) -> Ended:

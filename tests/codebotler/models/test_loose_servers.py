@@ -146,8 +146,9 @@ def test_reply_without_choices_raises_one_sentence(name: str, server: Server, bo
 
 @both
 def test_error_names_the_address_of_a_redirect(name: str, server: Server) -> None:
-    server.sends = lambda request: (308, {"Location": f"https://new.example/v1{request.path}"}, b"")
-    with pytest.raises(ModelError, match=r"redirects to https://new\.example/v1;") as caught:
+    address = "https://me:secret@new.example/v1/completions?key=secret"
+    server.sends = lambda _request: (308, {"Location": address}, b"")
+    with pytest.raises(ModelError, match=r"redirects to https://new\.example/v1/completions;") as caught:
         ask(name, server)
     assert not caught.value.may_pass
     assert len(server.requests) == 1

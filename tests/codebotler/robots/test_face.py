@@ -183,7 +183,7 @@ def test_unanswered_question_times_out() -> None:
     ended = face.shown.ended
     assert ended is not None
     assert (ended.how, face.shown.question) == ("unanswered", None)
-    with pytest.raises(AnswerError, match="time"):
+    with pytest.raises(AnswerError, match="closed"):
         face.answer(ended.number, 0)
 
 
@@ -198,7 +198,7 @@ def test_the_first_answer_counts_and_later_ones_are_refused() -> None:
         with pytest.raises(AnswerError, match="closed"):
             face.answer(number + 1, 0)
         face.answer(number, 1)
-        with pytest.raises(AnswerError, match=r'already .*"No"'):
+        with pytest.raises(AnswerError, match="closed"):
             face.answer(number, 0)
     assert ended == ["No"]
 
@@ -226,7 +226,7 @@ def test_a_stop_withdraws_the_question_and_silences_the_robot() -> None:
         assert face.shown.question is None
         assert face.shown.ended is not None
         assert face.shown.ended.how == "withdrawn"
-        with pytest.raises(AnswerError, match="it was withdrawn"):
+        with pytest.raises(AnswerError, match="closed"):
             face.answer(number, 0)
     assert isinstance(ended[0], CancelledError)
     calls: list[tuple[str, list[RobotArgument]]] = [

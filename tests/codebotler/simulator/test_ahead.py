@@ -64,8 +64,8 @@ def test_child_of_a_dead_server_is_never_signalled(
     server = server_of(own_worker)
     assert server._next is not None
     ready = server._next.pid
-    os.kill(server.pid, signal.SIGKILL)
-    assert are_gone({server.pid, ready})
+    os.kill(server._process.pid, signal.SIGKILL)
+    assert are_gone({server._process.pid, ready})
     signalled: list[int] = []
     kill = os.kill
 

@@ -437,7 +437,7 @@ def test_exception_of_an_own_skill_reaches_the_caller(worker: Worker) -> None:
 
 
 def test_killed_child_loses_only_the_program_that_it_ran(worker: Worker) -> None:
-    fork_server = worker._fork_server(BatchServer).pid
+    fork_server = worker._fork_server(BatchServer)._process.pid
     killed: list[int] = []
 
     def kill_the_child(_robot: SimulatedRobot, person: str) -> str:
@@ -463,7 +463,7 @@ def test_killed_child_loses_only_the_program_that_it_ran(worker: Worker) -> None
 def test_killed_fork_server_loses_no_outcome() -> None:
     def kill_the_server(_robot: SimulatedRobot, _person: str) -> str:
         if not killed:
-            killed.append(worker._fork_server(BatchServer).pid)
+            killed.append(worker._fork_server(BatchServer)._process.pid)
             os.kill(killed[0], signal.SIGKILL)
         return "done"
 

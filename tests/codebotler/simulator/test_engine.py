@@ -631,12 +631,6 @@ def test_events_of_runs_are_logged_and_off_by_default(caplog: pytest.LogCaptureF
     ]
 
 
-def test_windows_is_refused_with_the_platform_patched(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "platform", "win32")
-    with pytest.raises(EngineError, match="WSL"):
-        list(run([(saying("a"), WORLD)], workers=1))
-
-
 def test_macos_warns_of_less_isolation_with_the_platform_patched(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

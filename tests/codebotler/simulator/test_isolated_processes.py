@@ -79,8 +79,8 @@ def states() -> Iterator[dict[str, IsolationState]]:
             IDLE_PROCESSES["codebotler.simulator.process.compiler"][-1]._process.pid
         )
         for kind, fork_server in worker._fork_servers.items():
-            found[kind.__name__] = IsolationState.of(fork_server.pid)
-            for pid in filter(is_alive, children_of(fork_server.pid)):
+            found[kind.__name__] = IsolationState.of(fork_server._process.pid)
+            for pid in filter(is_alive, children_of(fork_server._process.pid)):
                 found[message] = IsolationState.of(pid)
 
     def new_robot() -> SimulatedRobot:

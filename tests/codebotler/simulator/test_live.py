@@ -207,7 +207,7 @@ def test_other_exceptions_of_the_robot_end_the_child_and_are_raised(worker: Work
     with pytest.raises(StoppedError):
         worker.run_live(stubborn, machine)
     assert machine.done == ["a"]
-    assert are_gone(children_of(worker._fork_servers[ForkServer].pid))
+    assert are_gone(children_of(worker._fork_servers[ForkServer]._process.pid))
     assert run_live(worker, "def task_program(): say('next')")[0] == ["next"]
 
 

@@ -178,10 +178,6 @@ def test_rows_are_those_of_generate(tmp_path: Path, model: str) -> None:
         ),
         ({"content": None, "refusal": "I cannot."}, {"no_program": "refusal", "raw_reply": "I cannot."}),
         (
-            {"content": None, "reasoning_content": "No.", "refusal": "I cannot."},
-            {"no_program": "refusal", "raw_reply": "I cannot.", "reasoning": "No."},
-        ),
-        (
             {
                 "content": None,
                 "tool_calls": [

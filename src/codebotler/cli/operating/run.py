@@ -15,14 +15,7 @@ from codebotler.cli.programs.check import check_view, contract_view, read_progra
 from codebotler.cli.programs.generate import ADD_SENTENCE, ask_which, note_programless
 from codebotler.cli.views import EventPrinter, continue_view, ending_view, source_view
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import (
-    busy,
-    confirm,
-    note,
-    print_rich,
-    read_line,
-    shortened,
-)
+from codebotler.core.terminal import busy, confirm, note, print_rich, read_line, shortened
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.mission import STOP_GRACE_SECONDS, MissionError
 from codebotler.missions.recovery import PriorApproval, ask_evidence, past_to_recover
@@ -65,10 +58,8 @@ class Request:
             raise UserError("the argument is empty; name a program, or say what the robot should do")
         if self.what.endswith(".py") and not self.is_program:
             raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
-        if self.recoveries and self.is_program and self.past is None:
-            raise UserError("--recover needs an instruction, since a model writes the rest; leave it out")
-        if self.candidates > 1 and self.is_program:
-            raise UserError("--candidates needs an instruction, but this is a program")
+        if (self.recoveries or self.candidates > 1) and self.is_program and self.past is None:
+            raise UserError("--recover and --candidates need an instruction, but this is a program")
         if self.what == "-" and not self.yes:
             raise UserError("the program uses standard input, so approval cannot be read; add --yes")
 

@@ -33,17 +33,13 @@ PROOF_STYLES = {"never": "green", "possible": "red", "unknown": "yellow"}
 
 def read_program(name: str) -> str:
     """Read a program file, or find the program in standard input (`-`), which may be a model's reply."""
-    if name != "-":
-        if not name:
-            raise UserError("the file name is empty; name a file, or - for standard input")
+    if name == "-":
+        text = program_in(decode_text(sys.stdin.buffer.read(MAX_FILE_BYTES + 1), STANDARD_INPUT))
+    else:
         text = read_text(Path(name))
-        if not text.strip():
-            raise UserError("the file contains no program", file=name)
-        return text
-    text = decode_text(sys.stdin.buffer.read(MAX_FILE_BYTES + 1), STANDARD_INPUT)
     if not text.strip():
-        raise UserError("is empty; pipe a program or a model's reply into it", file=STANDARD_INPUT)
-    return program_in(text)
+        raise UserError("contains no program", file=STANDARD_INPUT if name == "-" else name)
+    return text
 
 
 def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool = False) -> RenderableType:

@@ -16,16 +16,7 @@ from codebotler.checking.check import check
 from codebotler.checking.sampled import CheckSettings
 from codebotler.checking.storyboard import storyboard
 from codebotler.core.errors import UserError
-from codebotler.core.terminal import (
-    busy,
-    console,
-    is_interactive,
-    note,
-    print_source,
-    read_line,
-    shortened,
-    visible,
-)
+from codebotler.core.terminal import busy, console, note, print_source, shortened, visible
 from codebotler.core.text.words import brief, counted, listed, with_sentence
 from codebotler.generation.generate import Attempt, gather_candidates, write_checked_program
 from codebotler.generation.no_program import ProgramlessReply
@@ -99,11 +90,6 @@ def print_prompt(prompt: Prompt, model: str) -> None:
 
 
 # --- several programs
-
-
-def line_reader() -> Callable[[str], str] | None:
-    """Return a function that asks on the terminal, or None if there is no terminal."""
-    return read_line if is_interactive() else None
 
 
 def choose_candidate(

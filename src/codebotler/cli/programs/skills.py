@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -103,15 +103,7 @@ def _lines(rows: Sequence[Skill], skills: SkillTable) -> Iterator[RenderableType
     for number, row in enumerate(rows):
         yield Text("\n" if number else "", end="")
         yield Syntax(stub(row), "python", theme="ansi_dark", background_color="default", word_wrap=True)
-        trials = try_skill(row, skills)
-        random_trials = [one for one in trials if one.outcome.startswith("returns ") and not one.facts]
-        if len(random_trials) > 1:
-            values = listed([one.outcome.removeprefix("returns ") for one in random_trials], "or")
-            trials = [
-                replace(random_trials[0], outcome=f"returns {values}"),
-                *(t for t in trials if t not in random_trials),
-            ]
-        for trial in trials:
+        for trial in try_skill(row, skills):
             where = f", where {listed(trial.facts)}" if trial.facts else ""
             yield Text(visible(f"  {row.call} {trial.outcome}{where}"), "dim")
             if trial.event is not None and not trial.outcome.startswith("fails"):

@@ -100,20 +100,9 @@ def _response(status: int, body: Any) -> httpx2.Response:  # noqa: ANN401 - any 
     """Build the response that a server would have sent as a stream."""
     if status >= FIRST_ERROR:
         return httpx2.Response(status, json=body)
-    head = {name: value for name, value in body.items() if name not in {"choices", "usage"}}
-    *earlier, last = _split_choice(body["choices"][0])
-    chunks = [{"choices": [choice]} for choice in earlier] + [{"choices": [last], "usage": body.get("usage")}]
-    events = [json.dumps({**head, "object": "chat.completion.chunk", **chunk}) for chunk in chunks]
-    text = "".join(f"data: {event}\n\n" for event in [*events, "[DONE]"])
+    choice = dict(body["choices"][0])
+    if isinstance(message := choice.pop("message", None), Mapping):
+        choice["delta"] = {name: value for name, value in message.items() if value is not None}
+    chunk = {**body, "object": "chat.completion.chunk", "choices": [choice]}
+    text = f"data: {json.dumps(chunk)}\n\ndata: [DONE]\n\n"
     return httpx2.Response(200, headers=STREAM_HEADERS, text=text)
-
-
-def _split_choice(choice: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Split a choice into the choices of a stream, with the reasoning first."""
-    message = choice.get("message")
-    if not isinstance(message, Mapping):
-        return [dict(choice)]
-    said = {name: value for name, value in message.items() if value is not None}
-    thought = {name: said.pop(name) for name in (*said,) if name.startswith("reasoning")}
-    last = {**{name: value for name, value in choice.items() if name != "message"}, "delta": said}
-    return [*([{"index": 0, "delta": thought, "finish_reason": None}] if thought else []), last]

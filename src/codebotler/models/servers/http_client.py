@@ -23,7 +23,6 @@ MIN_REPLY_BYTES = 8_000_000
 BYTES_PER_TOKEN = 4_000  # each event of a stream is much longer than its token
 ASSUMED_TOKENS = 100_000  # assumed for replies without a limit
 CERTIFICATE_VARIABLES = ("SSL_CERT_FILE", "SSL_CERT_DIR")
-ENDPOINTS = ("/chat/completions", "/completions", "/responses", "/messages")
 
 
 def byte_limit(max_tokens: int | None) -> int:
@@ -45,8 +44,11 @@ def limit_replies(client: HTTPClient, name: str, limit: int) -> HTTPClient:
             raise ModelError(sentence, may_pass=False)
         response.stream = _limit_stream(response.stream, name, limit)
         if response.has_redirect_location:
-            address = _base_url(str(response.url.join(response.headers["location"])))
-            sentence = f"{name}: the server redirects to {address}; set the base URL to this address"
+            # Leave out parts that may be secret.
+            address = response.url.join(response.headers["location"]).copy_with(
+                userinfo=b"", query=None, fragment=None
+            )
+            sentence = f"{name}: the server redirects to {address}; change the base URL accordingly"
             raise ModelError(sentence, may_pass=False)
         is_json = response.headers.get("content-type", "").startswith("application/json")
         if is_json and response.status_code < FIRST_ERROR and b'"stream":true' in response.request.content:
@@ -56,16 +58,6 @@ def limit_replies(client: HTTPClient, name: str, limit: int) -> HTTPClient:
     client.headers["accept-encoding"] = "identity"
     client.event_hooks["response"].append(check)
     return client
-
-
-def _base_url(url: str) -> str:
-    """Return the base URL of a redirect, without parts that may be secret."""
-    parts = urlsplit(url)
-    path = parts.path.rstrip("/")
-    for endpoint in ENDPOINTS:
-        path = path.removesuffix(endpoint)
-    port = f":{parts.port}" if parts.port else ""
-    return f"{parts.scheme}://{parts.hostname}{port}{path}"
 
 
 def _error_instead_of_stream(name: str, body: bytes) -> ModelError:

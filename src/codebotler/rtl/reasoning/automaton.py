@@ -97,13 +97,8 @@ def machine_of(formula: formulas.Formula) -> Machine:
         case formulas.Not(part):
             start, step, accepts = machine_of(part)
             return Machine(start, step, lambda state: not accepts(state))
-        case formulas.ActAtFirst(_, element, scopes):
-            stay = (
-                formulas.Scope("AfterFirst", formula.arrival),
-                formulas.Scope("BeforeFirst", formula.departure),
-            )
-            arrives = formulas.Exists(formula.arrival, scopes)
-            return machine_of(formulas.And((arrives, formulas.Exists(element, (*scopes, *stay)))))
+        case formulas.ActAtFirst(_, element):
+            return machine_of(formulas.Exists(element, formula.stay))
         case formulas.ActAtSome():
             machine = _during_stays(formula)
         case formulas.Exists(element):

@@ -75,11 +75,6 @@ class ForkServer:
         return IsolatedProcess(self._pid_of_child, ours, self._end_of_child)
 
     @property
-    def pid(self) -> int:
-        """The fork server's process id."""
-        return self._process.pid
-
-    @property
     def has_ended(self) -> bool:
         """Whether the fork server has ended."""
         return self._process.poll() is not None

@@ -11,12 +11,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.yaml_files import YamlFile
 from codebotler.robots.places import Places, read_places
-from codebotler.robots.ros.connections.connection import (
-    CALL_VARIABLE,
-    PLACE_VARIABLES,
-    Connection,
-    SkillCall,
-)
+from codebotler.robots.ros.connections.connection import CALL_VARIABLE, PLACE_VARIABLES, Connection, SkillCall
 
 
 def _check_topic(text: str) -> str:
