@@ -124,11 +124,11 @@ def missions(
         known = store.read_missions(home())
         print_found(lambda: list_view(known), lambda: list(map(asdict, known)), as_json=json)
         return
+    if mcap is not None:
+        from codebotler.missions.storage.mcap import export_mcap  # names its extra if that is missing
     folder = store.find_mission(home(), mission or "last")
     summary, events = MissionSummary.read(folder), read_events(folder)
     if mcap is not None:
-        from codebotler.missions.storage.mcap import export_mcap
-
         export_mcap(mcap, summary, events, "robot" if clock == "robot" else "wall", folder)
         note(f"wrote {len(events):,} events of mission {summary.id} to {mcap}")
         return
