@@ -113,7 +113,7 @@ def missions(
     from codebotler.core.skills.files import skills_from
     from codebotler.core.terminal import print_found
     from codebotler.missions.storage import store
-    from codebotler.missions.storage.log import MissionSummary, read_events
+    from codebotler.missions.storage.log import LogLine, MissionSummary, read_events
 
     if clock not in {"wall", "robot"}:
         raise UserError(f'unknown clock "{clock}"; use wall or robot')
@@ -124,14 +124,19 @@ def missions(
         known = store.read_missions(home())
         print_found(lambda: list_view(known), lambda: list(map(asdict, known)), as_json=json)
         return
+
+    def read() -> tuple[Path, MissionSummary, list[LogLine]]:
+        folder = store.find_mission(home(), mission or "last")
+        return folder, MissionSummary.read(folder), read_events(folder)
+
     if mcap is not None:
-        from codebotler.missions.storage.mcap import export_mcap  # names its extra if that is missing
-    folder = store.find_mission(home(), mission or "last")
-    summary, events = MissionSummary.read(folder), read_events(folder)
-    if mcap is not None:
+        from codebotler.missions.storage.mcap import export_mcap
+
+        folder, summary, events = read()  # only if the extra is there
         export_mcap(mcap, summary, events, "robot" if clock == "robot" else "wall", folder)
         note(f"wrote {len(events):,} events of mission {summary.id} to {mcap}")
         return
+    folder, summary, events = read()
     print_found(
         lambda: mission_view(summary, events, store.find_rest(folder)),
         lambda: {**asdict(summary), "events": events},
