@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from functools import lru_cache
@@ -15,7 +16,7 @@ from codebotler.rtl.text.clauses import clauses, complete_clauses, sentences
 from codebotler.rtl.text.numbers import numerals
 from codebotler.rtl.text.polarity import Polarity, polarity, without_harmless
 from codebotler.rtl.text.times import times_in
-from codebotler.simulator.worlds.matching import SOMEBODY, normalized, whole_words
+from codebotler.simulator.worlds.matching import SOMEBODY, means_person, normalized, whole_words
 from codebotler.simulator.worlds.sampled_robot import AGREEING_TEXT
 
 PAPER_KINDS = frozenset({GOTO, SAY, CHECK, ASK, PICK, PLACE})
@@ -105,6 +106,45 @@ def statements(trace: Trace) -> Iterator[tuple[str, str]]:
 def wording(trace: Trace) -> frozenset[str]:
     """Return all that the robot says and asks, in lower case."""
     return frozenset(_plain(one.text) for one in trace if one.kind in {SAY, ASK})
+
+
+def count_conflicts(traces: Iterable[Trace], homes: Iterable[tuple[str, str]] = ()) -> int:
+    """Count contradictions between runs in the same world.
+
+    A run may meet somebody or something that another one misses, a person may be in several rooms, and a
+    question may have several answers. `homes` are people and their rooms that no trace names.
+    """
+    seen = {one for trace in traces for one in _encounters(trace)}
+    met, missed = ({one[:2] for one in seen if one[2] is is_there} for is_there in (True, False))
+    named = {(name, room) for name, room, is_there, is_person, _ in seen if is_there and is_person}
+    named |= {*homes}
+    rooms = Counter(name for name, _ in named if name != SOMEBODY)
+    answers = Counter(one[:2] for one in {(room, *said) for _, room, _, _, said in seen if said})
+    met |= {(SOMEBODY, room) for _, room in named}
+    return len(met & missed) + sum(count - 1 for count in (*rooms.values(), *answers.values()))
+
+
+def people_sought(traces: Iterable[Trace]) -> set[tuple[str, str]]:
+    """Return the names of people that runs looked for or asked, each with the room."""
+    found = (one for trace in traces for one in _encounters(trace))
+    return {(name, room) for name, room, _, is_person, _ in found if is_person and name != SOMEBODY}
+
+
+def _encounters(trace: Trace) -> Iterator[tuple[str, str, bool, bool, tuple[str, ...]]]:
+    """Yield each name that the run has not moved: its room, whether it is there, whether it is a person.
+
+    For questions, the words and the answer follow.
+    """
+    moved: set[str] = set()
+    for one in trace:
+        name = normalized(one.to or SOMEBODY if one.kind == ASK else one.text)
+        is_person = one.kind == ASK or means_person(one.text)
+        is_known = one.kind in {CHECK, PICK} or (one.kind == ASK and bool(one.answer))
+        if is_known and name not in moved and not one.failed:
+            said = (_plain(one.text), _plain(one.answer or "")) if one.kind == ASK else ()
+            yield name, one.place, one.found is not False, is_person, said
+        if one.kind in {PICK, PLACE}:
+            moved.add(name)
 
 
 def rooms_with_several(traces: Iterable[Trace]) -> frozenset[str]:

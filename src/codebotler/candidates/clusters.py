@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-from codebotler.candidates.behaviour import Behaviour, behaviour_of, names_in, rooms_with_several, wording
+from codebotler.candidates.behaviour import (
+    Behaviour,
+    behaviour_of,
+    count_conflicts,
+    names_in,
+    people_sought,
+    rooms_with_several,
+    wording,
+)
 from codebotler.checking.check import check_on
 from codebotler.checking.problems import Sample
 from codebotler.checking.sampled import (
@@ -22,11 +30,12 @@ from codebotler.core.errors import UserError
 from codebotler.core.text.words import counted
 from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.worker import Worker
-from codebotler.simulator.worlds.fact_sampler import FactSampler
-from codebotler.simulator.worlds.matching import contains, normalized
+from codebotler.simulator.worlds.fact_sampler import Draw, FactSampler
+from codebotler.simulator.worlds.matching import SOMEBODY, contains, normalized
 from codebotler.simulator.worlds.room_map import RoomMap
 
 RANDOM_WORLDS, MAX_SHARED_WORLDS = 8, 24  # random worlds, and worlds with those that try further facts
+SETTLED_WORLDS = 16  # added if candidates contradict each other in all of these
 ROOM_NUMBER = re.compile(r"\s*\d+$")
 
 
@@ -51,6 +60,12 @@ class CandidateCluster:
         """The most frequent program, which represents the cluster."""
         return self.programs[0]
 
+    def extended(self, samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> CandidateCluster:
+        """Return the cluster with runs of its first program in further worlds."""
+        runs, all_behaviours = (*self.samples, *samples), (*self.behaviours, *behaviours)
+        numbered = tuple(replace(sample, number=number) for number, sample in enumerate(runs))
+        return replace(self, samples=numbered, behaviours=all_behaviours)
+
 
 @dataclass(frozen=True)
 class CandidateClusters:
@@ -60,11 +75,13 @@ class CandidateClusters:
         clusters: at least one. If the check rejects all candidates, the only cluster has the first of them.
         rejected: the number of rejected candidates that are not in a cluster.
         unwanted: the number of accepted candidates that behave like a refused program.
+        people: the names of the people on the map, from `normalized`.
     """
 
     clusters: tuple[CandidateCluster, ...]
     rejected: int = 0
     unwanted: int = 0
+    people: frozenset[str] = frozenset()
 
     @property
     def total(self) -> int:
@@ -115,10 +132,11 @@ def cluster_candidates(
     runs = run_in_shared_worlds(worker, [*accepted, *refused], rooms, settings)
     traces = [sample.outcome.trace for samples in runs for sample in samples]
     names, several = names_in((*rooms.rooms, *rooms.people), traces), rooms_with_several(traces)
-    behaviours = [
-        tuple(behaviour_of(sample.outcome, rooms.start, names, several) for sample in samples)
-        for samples in runs
-    ]
+
+    def describe(samples: Iterable[Sample]) -> tuple[Behaviour, ...]:
+        return tuple(behaviour_of(one.outcome, rooms.start, names, several) for one in samples)
+
+    behaviours = [*map(describe, runs)]
     texts = [[wording(sample.outcome.trace) for sample in samples] for samples in runs]
     rejected = len(programs) - sum(counts[one] for one in accepted)
     together: dict[tuple[Behaviour, ...], list[int]] = {}
@@ -129,8 +147,13 @@ def cluster_candidates(
         again = counted(len(programs) - rejected, "program")
         raise UserError(f"{again} would do again what was not meant; give the instruction in other words")
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
+    people = frozenset(map(normalized, rooms.people))
+    if len(clusters) > 1 and min(conflicts_in_worlds(clusters, people).values()):
+        more = _run_with_settled_people(worker, clusters, rooms, settings)
+        clusters = [one.extended(new, describe(new)) for one, new in zip(clusters, more, strict=True)]
     unwanted_count = len(programs) - rejected - sum(one.size for one in clusters)
-    return CandidateClusters(tuple(sorted(clusters, key=lambda one: -one.size)), rejected, unwanted_count)
+    clusters.sort(key=lambda one: -one.size)
+    return CandidateClusters(tuple(clusters), rejected, unwanted_count, people)
 
 
 def compare_candidates(
@@ -198,6 +221,48 @@ def run_in_shared_worlds(
         found = (one for samples in runs for one in unexplored_samplers(samples, samplers))
         new = list(dict.fromkeys(found))[: MAX_SHARED_WORLDS - len(samplers)]
     return [[replace(sample, number=number) for number, sample in enumerate(samples)] for samples in runs]
+
+
+def conflicts_in_worlds(clusters: Sequence[CandidateCluster], people: Container[str] = ()) -> dict[int, int]:
+    """Count the contradictions in each world in which the clusters differ; see `count_conflicts`."""
+    conflicts: dict[int, int] = {}
+    for number in range(len(clusters[0].samples)):
+        if len({one.behaviours[number] for one in clusters}) > 1:
+            samples = [one.samples[number] for one in clusters]
+            homes = _drawn_places(samples, people, results=[1])
+            conflicts[number] = count_conflicts((one.outcome.trace for one in samples), homes)
+    return conflicts
+
+
+def _drawn_places(
+    samples: Iterable[Sample], people: Container[str], *, results: Container[int]
+) -> set[tuple[str, str]]:
+    """Return people with the rooms for which it was drawn whether they are there, with one of the results."""
+    draws = {draw for sample in samples for draw in sample.draws if draw.method == "is_there"}
+    places = ((str(draw.arguments[1]), str(draw.arguments[0]), draw.result) for draw in draws)
+    return {(name, room) for name, room, result in places if name in people and result in results}
+
+
+def _run_with_settled_people(
+    worker: Worker, clusters: Sequence[CandidateCluster], room_map: RoomMap, settings: CheckSettings
+) -> list[list[Sample]]:
+    """Run the first program of each cluster in random worlds where each person is in one room at most."""
+    samples = [sample for one in clusters for sample in one.samples]
+    places = people_sought(sample.outcome.trace for sample in samples)
+    places |= _drawn_places(samples, {*map(normalized, room_map.people)}, results=[0, 1])
+    homes: dict[str, list[str]] = {}  # the rooms in which each person may be
+    for name, room in sorted(places):
+        homes.setdefault(name, []).append(room)
+    samplers = []
+    for number in range(MAX_SHARED_WORLDS, MAX_SHARED_WORLDS + SETTLED_WORLDS):
+        sampler = FactSampler(settings.seed, number, by_options=True)
+        forced: list[Draw] = []
+        for name, rooms in homes.items():
+            home = rooms[sampler.draw(len(rooms), "home", name)]
+            forced += [Draw("is_there", (room, name), int(room == home)) for room in rooms]
+            forced.append(Draw("is_there", (home, SOMEBODY), 1))
+        samplers.append(replace(sampler, forced=tuple(forced)))
+    return _run_all(worker, [one.program for one in clusters], room_map, samplers, settings)
 
 
 def _run_all(

@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 from codebotler.candidates.behaviour import PAPER_KINDS, Behaviour, statements
-from codebotler.candidates.clusters import CandidateCluster, CandidateClusters
+from codebotler.candidates.clusters import CandidateCluster, CandidateClusters, conflicts_in_worlds
 from codebotler.checking.problems import Sample
 from codebotler.checking.storyboard import steps_of
 from codebotler.core.errors import UserError
-from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
+from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE, SAY
+from codebotler.core.terminal import shortened
 from codebotler.core.text.phrases import phrase
 from codebotler.core.text.words import brief, counted, elide_list, listed
-from codebotler.core.trace import Event, Trace
+from codebotler.core.trace import Event
 from codebotler.models.recorded import is_recorded
-from codebotler.simulator.worlds.matching import SOMEBODY, means_person, normalized
+from codebotler.simulator.worlds.matching import normalized
+from codebotler.simulator.worlds.sampled_facts import ANSWER_FORM
 
 DOMINANT_SHARE = 0.75
 """The largest cluster is taken without a question if it has at least this share of the candidates."""
 
-MAX_CANDIDATE_OPTIONS, MAX_QUESTION_FACTS, MAX_SHOWN_DIFFERENCES = 3, 4, 4
+MAX_CANDIDATE_OPTIONS, MAX_QUESTION_FACTS = 3, 4
 NOTICED_FIRST = frozenset({"said", "moved", "asked", "room"})
 """The fields of a `Behaviour` that a person cares about most."""
 
@@ -33,6 +35,17 @@ ClarifyingAnswer: TypeAlias = int | Literal["none", "decide"]
 
 Aspect: TypeAlias = tuple[str, str]
 """A field of a `Behaviour` and the room or thing in question, such as `("said", "kitchen")`."""
+
+
+class WordLimits(NamedTuple):
+    """How long the description of an option may be."""
+
+    parts: int  # the most differences, texts, and rooms of a text
+    characters: int  # of a text
+
+
+BRIEF, WHOLE = WordLimits(4, 70), WordLimits(1_000, 4_000)
+"""The usual limits, and those for options whose brief descriptions are equal."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +74,7 @@ class ClarifyingQuestion:
         facts: the facts of the imagined world that explain the differences, in words.
         total: the number of accepted candidates.
         sample: the number of the imagined world.
+        rejected: the number of candidates that the check rejected.
         why_last: why no new programs are written after the answer `none`; empty if some are.
     """
 
@@ -68,13 +82,21 @@ class ClarifyingQuestion:
     facts: tuple[str, ...]
     total: int
     sample: int
+    rejected: int = 0
     why_last: str = ""
 
     @property
     def left_out(self) -> str:
         """A sentence about missing candidates: "Not shown: 2 programs that ..."; empty if none is missing."""
         left = self.total - sum(one.size for one in self.options)
-        return f"Not shown: {counted(left, 'program')} that would do something else." if left else ""
+        parts = [f"{counted(left, 'program')} that would do something else"] if left else []
+        parts += [f"{counted(self.rejected, 'program')} that the check rejects"] if self.rejected else []
+        return f"Not shown: {listed(parts)}." if parts else ""
+
+    @property
+    def supposition(self) -> str:
+        """The facts of the imagined world in a phrase for a sentence; empty if there are none."""
+        return f", supposing that {listed([*map(shortened, self.facts)])}" if self.facts else ""
 
     @property
     def programs(self) -> tuple[str, ...]:
@@ -84,7 +106,8 @@ class ClarifyingQuestion:
     @property
     def rejections(self) -> list[str]:
         """Hints for a model, one per option: "the person did not mean a robot that ends in kitchen"."""
-        return [f"the person did not mean a robot that {one.difference}" for one in self.options]
+        meant = f"the person did not mean{self.supposition}, a robot that"
+        return [f"{meant.replace(',', '', not self.facts)} {one.difference}" for one in self.options]
 
     def chosen(self, answer: ClarifyingAnswer) -> CandidateOption | None:
         """Return the option that an answer selects: the first one for `decide`, and None for `none`."""
@@ -127,9 +150,8 @@ def question_about(
     largest = groups.clusters[0]
     if len(groups.clusters) == 1 or largest.size >= dominant_share * groups.total:
         return None
-    every = range(len(largest.samples))
-    conflicts = [_count_conflicts([each.samples[one] for each in groups.clusters]) for one in every]
-    worlds = [one for one in every if conflicts[one] == min(conflicts)]
+    conflicts = conflicts_in_worlds(groups.clusters, groups.people)
+    worlds = [number for number, count in conflicts.items() if count == min(conflicts.values())]
     number = max(worlds, key=lambda one: _rank(_distinct_clusters(groups.clusters, one), one))
     shown = _distinct_clusters(groups.clusters, number)
     samples = [one.samples[number] for one in shown]
@@ -141,30 +163,7 @@ def question_about(
     why_last = "this is the second question" if is_second else ""
     why_last = "a recorded model writes no new programs" if is_recorded(model) else why_last
     facts = _facts_that_matter(shown, number)
-    return ClarifyingQuestion(tuple(options), facts, groups.total, number, why_last)
-
-
-def _count_conflicts(samples: Iterable[Sample]) -> int:
-    """Count contradictions: a name that one run meets and another misses, or a person in several rooms."""
-    seen = {one for sample in samples for one in _encounters(sample.outcome.trace)}
-    met, missed = ({one[:2] for one in seen if one[2] is is_there} for is_there in (True, False))
-    named = {(name, room) for name, room, is_there, is_person in seen if is_there and is_person}
-    rooms = Counter(name for name, _ in named if name != SOMEBODY)
-    met |= {(SOMEBODY, room) for _, room in named}
-    return len(met & missed) + sum(count - 1 for count in rooms.values())
-
-
-def _encounters(trace: Trace) -> Iterator[tuple[str, str, bool, bool]]:
-    """Yield each name that the run has not moved: its room, whether it is there, whether it is a person."""
-    moved: set[str] = set()
-    for one in trace:
-        name = normalized(one.to or SOMEBODY if one.kind == ASK else one.text)
-        is_person = one.kind == ASK or means_person(one.text)
-        is_known = one.kind in {CHECK, PICK} or (one.kind == ASK and bool(one.answer))
-        if is_known and name not in moved and not one.failed:
-            yield name, one.place, one.found is not False, is_person
-        if one.kind in {PICK, PLACE}:
-            moved.add(name)
+    return ClarifyingQuestion(tuple(options), facts, groups.total, number, groups.rejected, why_last)
 
 
 def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:
@@ -191,21 +190,29 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
     """Return the facts of a world that do not hold in all worlds where the options look the same."""
 
     def facts(world: int) -> list[str]:
-        return list(dict.fromkeys(fact for one in shown for fact in one.samples[world].drawn))
+        drawn = dict.fromkeys(fact for one in shown for fact in one.samples[world].facts if fact.is_random)
+        asked = Counter(fact.names[:-1] for fact in drawn if fact.form == ANSWER_FORM)
+        # The steps of each option show its answer, if options get different answers to the same words.
+        return [one.sentence for one in drawn if one.form != ANSWER_FORM or asked[one.names[:-1]] == 1]
 
     same = [world for world in range(len(shown[0].samples)) if len({o.behaviours[world] for o in shown}) == 1]
     alike = [set(facts(world)) for world in same]
     telling = [fact for fact in facts(number) if not alike or not all(fact in one for one in alike)]
-    return tuple((telling or facts(number))[:MAX_QUESTION_FACTS])
+    return tuple(elide_list(telling or facts(number), MAX_QUESTION_FACTS))
 
 
 def describe_differences(samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> list[str]:
     """Say of each run in one world only what differs from the other runs, such as "ends in kitchen"."""
     seen = [_aspects(behaviour) for behaviour in behaviours]
-    shown = sorted(_telling_first(seen)[:MAX_SHOWN_DIFFERENCES], key=lambda key: key[0] == "room")  # the end
-    said = [behaviour.said for behaviour in behaviours]
+    keys, said = _telling_first(seen), [behaviour.said for behaviour in behaviours]
     rooms = {room for one in said for other in said for room, _ in one - other}  # where the options differ
-    return [listed([_words(key, sample, rooms) for key in shown]) for sample in samples]
+    words: list[str] = []
+    for limits in (BRIEF, WHOLE):
+        shown = sorted(keys[: limits.parts], key=lambda key: key[0] == "room")  # the last room at the end
+        words = [listed([_words(key, sample, rooms, limits) for key in shown]) for sample in samples]
+        if len({*words}) == len(words):
+            break
+    return words
 
 
 def _telling_first(seen: Sequence[Mapping[Aspect, object]]) -> list[Aspect]:
@@ -233,14 +240,14 @@ def _aspects(behaviour: Behaviour) -> dict[Aspect, object]:
     return {**{key: frozenset(Counter(values).items()) for key, values in sorted(parts.items())}, **rest}
 
 
-def _words(key: Aspect, sample: Sample, rooms: Container[str]) -> str:
+def _words(key: Aspect, sample: Sample, rooms: Container[str], limits: WordLimits) -> str:
     """Describe an aspect of a run. Of what it says, only what it says in these `rooms`, if anything."""
     kind, name = key
     outcome = sample.outcome
     if kind == "said":
         said = [*statements(outcome.trace)]
         telling = [one for one in said if one[0] in rooms]
-        return f"{'only ' * bool(said and not telling)}says {_speech(telling or said)}"
+        return f"{'only ' * bool(said and not telling)}says {_speech(telling or said, limits)}"
     if kind == "moved":
         moves = (one for one in outcome.trace if one.kind in {PICK, PLACE} and normalized(one.text) == name)
         return _events(moves, f'leaves "{name}" alone')
@@ -256,16 +263,20 @@ def _words(key: Aspect, sample: Sample, rooms: Container[str]) -> str:
     return _events((one for one in outcome.trace if one.kind not in PAPER_KINDS), "does nothing else")
 
 
-def _speech(said: Iterable[tuple[str, str]]) -> str:
+def _speech(said: Iterable[tuple[str, str]], limits: WordLimits) -> str:
     rooms: dict[str, list[str]] = {}  # of each text
-    for room, text in said:
-        rooms.setdefault(brief(text).replace('"', "'"), []).append(room)
-    words = [f'"{text}" in {listed(elide_list([*dict.fromkeys(some)], 3))}' for text, some in rooms.items()]
-    return listed(elide_list(words, MAX_SHOWN_DIFFERENCES)) or "nothing"
+    for room, text in ((room, text) for room, texts in said for text in texts.splitlines()):
+        rooms.setdefault(brief(text, limits.characters).replace('"', "'"), []).append(room)
+    words = [
+        f'"{text}" in {listed(elide_list([*dict.fromkeys(some)], limits.parts))}'
+        for text, some in rooms.items()
+    ]
+    return listed(elide_list(words, limits.parts)) or "nothing"
 
 
 def _events(events: Iterable[Event], nothing: str) -> str:
-    words = (
-        f"{phrase(one, 'third')}{f' to {brief(one.to)!r}' if one.to else ''} in {one.place}" for one in events
+    words = Counter(
+        phrase(one, "third") + (f' to "{brief(one.to)}"' if one.to else "") + f" in {one.place}"
+        for one in events
     )
-    return listed([*dict.fromkeys(words)]) or nothing
+    return listed([f"{one} {count} times" if count > 1 else one for one, count in words.items()]) or nothing

@@ -98,6 +98,7 @@ class Mission:
         self._has_program = False  # also true for an empty program
         self._live: LiveRobot | None = None
         self.stuck: threading.Thread | None = None  # runs a skill that has not returned since a stop
+        self.may_move = False  # whether the robot was lost, or did not confirm a stop
         self._logged_rule: dict[str, object] = {}
         self._is_over = threading.Event()
         self._fault: Exception | None = None
@@ -295,7 +296,7 @@ class Mission:
             with self._writing:
                 if self.has_ended:
                     return
-                self.trace = live.trace
+                self.trace, self.may_move = live.trace, is_lost or bool(why)
                 self._log_stop()
                 if self.state is MissionState.STOPPING and why:
                     state, reason = MissionState.FAILED, why

@@ -187,12 +187,6 @@ class MissionSession(SharedView):
             mission.approve(despite_problems=despite_problems, by=by)
             self.is_approved_by_person = is_person
 
-    @property
-    def is_stuck(self) -> bool:
-        """Whether a skill still runs after a stop that the robot did not confirm, so the robot may move."""
-        stuck = None if self._mission is None else self._mission.stuck
-        return stuck is not None and stuck.is_alive()
-
     def reject(self, reason: str) -> None:
         """End the mission as failed, before it runs, and log the reason."""
         assert self._mission is not None, "there is a program to reject"
@@ -202,6 +196,10 @@ class MissionSession(SharedView):
         """Stop the robot, then all other work. Return once the request has reached the robot."""
         if self.is_stuck or not self._view.is_over:
             self._stop_button.press(by)
+        elif self.may_move and self._mission is not None:
+            with suppress(*EXPECTED_ERRORS), Reservation(self._robot, self._home):  # which cancels old goals
+                self._robot.cancel()
+                self._mission.may_move = bool(getattr(self._robot, "failed_stop", ""))
 
     def stop_soon(self, by: str) -> None:
         """Stop without waiting, for signal handlers and event loops."""
@@ -365,7 +363,7 @@ class MissionSession(SharedView):
         option = question.chosen(answer)
         if option is not None:
             who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
-            mission.note(f"{who}: a robot that {option.difference}")
+            mission.note(f"{who}{question.supposition}: a robot that {option.difference}")
             self._take(mission, option.program)
         elif not more or question.why_last:
             mission.fail(f"no program does what was meant{question.why_last and '; '}{question.why_last}")

@@ -81,7 +81,8 @@ class Console:
         self._checking = threading.Lock()
         which = quote(f"{robot.name} {normalize_address(robot.address)}", safe="", errors="replace")
         self._hold_file = home / "robots" / f"{which[:200]}.held"  # changed when a person presses STOP
-        self._stopped: MissionSession | None = None  # the session at a person's last STOP in this process
+        self._stopped: MissionSession | None = None  # the session at the last hold in this process
+        self._holds = False
         self._began = 0.0  # the time at which the current session began
 
     def __enter__(self) -> Self:
@@ -148,6 +149,8 @@ class Console:
             if before is not None and before.is_stuck:
                 raise MissionError(f"a skill of mission {before.view.id} has not ended; check the robot")
             self._end_hold()
+            if before is not None and before.may_move:
+                self._hold(before)
             if order.past is not None:
                 self.unfinished = ""
             elif before is not None and before.view.progress.has_begun:
@@ -202,7 +205,8 @@ class Console:
                 view = session.wait_until(lambda now: now.may_be_approved or now.waits_for_program)
                 if approval is not None and approval.allows(view, past) and self._may_recover is session:
                     by = f"the approval of mission {approval.mission}"
-                    session.approve(view.digest, by=by, is_person=False)
+                    with suppress(MissionError):  # a person has changed the rest, and approves it, too
+                        session.approve(view.digest, by=by, is_person=False)
                     if self._may_recover is not session:
                         session.stop(BY_PAGE)
 
@@ -223,14 +227,15 @@ class Console:
 
     @property
     def is_held(self) -> bool:
-        """Whether a person must approve the next mission, after a person's STOP, even before a restart."""
-        return self._hold_file.exists()
+        """Whether a person must approve the next mission, after a STOP or a loss, even before a restart."""
+        return self._holds or self._hold_file.exists()
 
     def _end_hold(self) -> None:
         """End the hold after a person's STOP if a person has approved the mission that began after it."""
         session = self.session
         if session is None or not session.is_approved_by_person or session is self._stopped:
             return
+        self._holds = False
         with suppress(OSError):
             if self._began > self._hold_file.stat().st_mtime:
                 self._hold_file.unlink()
@@ -247,17 +252,25 @@ class Console:
         """
         with self._lock:
             session, self._may_recover = self.session, None
-            is_stuck = session is not None and session.is_stuck
-            stops = is_stuck or (session is not None and session.view.is_approved)
+            may_move = session is not None and session.may_move
+            stops = may_move or (session is not None and session.view.is_approved)
+            is_late = session is None or (session.view.is_over and not may_move)
+            if session is not None and not is_late and (stops or not only_moving):
+                session.stop_soon(by)
             if holds and (stops or not only_moving):
-                self._stopped = session
-                with suppress(OSError):  # the robot must stop, whatever the disk does
-                    self._hold_file.touch()
-                    os.utime(self._hold_file)
-        if session is None or not (stops or not only_moving) or (session.view.is_over and not is_stuck):
-            return False
-        session.stop_soon(by)
-        return True
+                self._hold(session)
+        return not is_late and (stops or not only_moving)
+
+    def _hold(self, session: MissionSession | None) -> None:
+        """Have a person approve the mission after this session."""
+        self._stopped, self._holds = session, True
+
+        def write() -> None:
+            with suppress(OSError):
+                self._hold_file.touch()
+                os.utime(self._hold_file)
+
+        threading.Thread(target=write, daemon=True).start()  # no STOP waits for the disk
 
     def check(
         self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()

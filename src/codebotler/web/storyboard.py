@@ -171,8 +171,9 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
         ending = "Done."
     world = shortened(f"If {sample.world}", _MAX_WORLD_TEXT) if sample.facts else ""
     steps = steps_of(sample.outcome.trace, has_places=True)
+    repeated = {(event, event.place) for event in sample.repeated}
     for step, event in zip(steps, sample.outcome.trace, strict=True):
-        step["is_repeated"] = event in sample.repeated
+        step["is_repeated"] = (event, event.place) in repeated
     needed = [step["step"] for step in steps if step["is_repeated"]]
     shown = scenes(steps, check.room_map.start, needed)
     return Strip(world, shown, ending, error is None or is_harmless)

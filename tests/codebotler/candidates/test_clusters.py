@@ -4,7 +4,14 @@ from collections.abc import Iterator
 
 import pytest
 
-from codebotler.candidates.clusters import CandidateClusters, cluster_candidates, shared_rooms
+from codebotler.candidates.clusters import (
+    RANDOM_WORLDS,
+    SETTLED_WORLDS,
+    CandidateClusters,
+    cluster_candidates,
+    conflicts_in_worlds,
+    shared_rooms,
+)
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.rtl import parse
@@ -86,6 +93,21 @@ def test_further_worlds_try_facts_that_no_random_world_has(worker: Worker) -> No
     asks = f'def task_program():\n    say(ask("", "How many cups?", {options}))\n'
     (found,) = cluster(worker, asks).clusters
     assert len({one.said for one in found.behaviours}) == len(options)
+
+
+def test_a_person_is_in_one_room_in_some_world(worker: Worker) -> None:
+    search = "def task_program():\n    for room in get_all_rooms():\n        go_to(room)\n        {}\n"
+    warn = search.format("if is_in_room('zoe') or is_in_room('omar'): say('Mind the floor')")
+    warn_all = search.format("is_in_room('zoe'); is_in_room('omar'); say('Mind the floor')")
+    rooms = RoomMap(tuple(f"room {number}" for number in range(12)), "room 0", people=("Zoe", "Omar"))
+    found = cluster(worker, warn, warn_all, rooms=rooms)
+    conflicts = conflicts_in_worlds(found.clusters, found.people)
+    assert min(conflicts[number] for number in range(RANDOM_WORLDS)) > 0, "somebody is in several rooms"
+    worlds = range(RANDOM_WORLDS + SETTLED_WORLDS)
+    assert [conflicts[number] for number in worlds[RANDOM_WORLDS:]] == [0] * SETTLED_WORLDS
+    for one in found.clusters:
+        assert [sample.number for sample in one.samples] == [*worlds]
+        assert len(one.behaviours) == len(worlds)
 
 
 def test_rejected_candidates_are_dropped(worker: Worker) -> None:

@@ -10,7 +10,7 @@ from codebotler.candidates.question import ClarifyingQuestion, describe_differen
 from codebotler.checking.problems import Sample
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Event, Option, Outcome, Status, Trace
-from codebotler.simulator.worlds.sampled_facts import whereabouts
+from codebotler.simulator.worlds.sampled_facts import ANSWER_FORM, SampledFact, whereabouts
 
 MUG, NO_MUG = (whereabouts("mug", "lab", is_there=there) for there in (True, False))
 CUP = whereabouts("cup", "lab", is_there=True)
@@ -66,6 +66,10 @@ def test_question_offers_at_most_the_three_largest_options() -> None:
     assert question.total == 10
     assert "1 program " in question.left_out
     assert not ask_about(cluster(2, "a", ONE), cluster(1, "b", TWO)).left_out
+    clusters = CandidateClusters((cluster(2, "a", ONE), cluster(1, "b", TWO)), rejected=2)
+    rest = question_about(clusters)
+    assert rest is not None
+    assert "2 programs that the check rejects" in rest.left_out
 
 
 def test_a_shorter_storyboard_is_preferred() -> None:
@@ -97,9 +101,10 @@ def test_world_that_one_option_contradicts_is_avoided() -> None:
     picked = Event("pick", "stapler", place="lab")
     missed = Event("check", "stapler", found=False, place="lab")
     asked = Event("ask", "Tea?", options=(Option("yes"),), answer="yes", to="Ann", place="hall")
+    asked_again = replace(asked, answer="no")
     absent = Event("check", "Ann", found=False, place="hall")
     elsewhere = Event("check", "Ann", found=True, place="lab")
-    for one, other in ((picked, missed), (asked, absent), (asked, elsewhere)):
+    for one, other in ((picked, missed), (asked, absent), (asked, elsewhere), (asked, asked_again)):
         question = ask_about(cluster(1, "a", (one, *ONE), ONE), cluster(1, "b", (other, *TWO, *TWO), TWO))
         assert question.sample == 1, (one, other)
     after = (picked, missed)  # It is gone because this robot has it.
@@ -132,12 +137,42 @@ def test_sentences_describe_only_differences() -> None:
     assert describe((drive("hall", "lab"), *ONE), ()) == both
 
 
+def test_sentence_quotes_each_utterance_and_counts_equal_steps() -> None:
+    picks = Event("pick", "mug", place="lab"), Event("place", "mug", place="hall")
+    two, none = describe((say("Hi"), say("Bye"), *picks, *picks), ())
+    assert 'says "Hi" in hall and "Bye" in hall' in two
+    assert 'picks up "mug" in lab 2 times' in two
+    assert "says nothing" in none
+
+
+def test_texts_that_differ_late_are_shown_whole() -> None:
+    one, other = (f"{'Dear visitors, ' * 8}please leave by door {number}" for number in (1, 4))
+    assert describe((say(one),), (say(other),)) == [f'says "{text}" in hall' for text in (one, other)]
+
+
+def test_rejections_name_the_world_that_they_are_about() -> None:
+    question = ask_about(cluster(1, "a", ONE, ONE), cluster(1, "b", TWO, ONE))
+    assert all(MUG.sentence in one for one in question.rejections)
+
+
+def test_different_answers_to_the_same_words_are_no_facts() -> None:
+    one, other = cluster(1, "a", ONE), cluster(1, "b", TWO)
+    facts = [SampledFact(ANSWER_FORM, ("lab", "Tea?", answer)) for answer in ("yes", "green")]
+    clusters = [
+        replace(each, samples=(replace(each.samples[0], facts=(fact, CUP)),))
+        for each, fact in zip((one, other), facts, strict=True)
+    ]
+    assert ask_about(*clusters).facts == (CUP.sentence,)
+    same = [replace(each, samples=clusters[0].samples) for each in clusters]
+    assert ask_about(*same).facts == (facts[0].sentence, CUP.sentence)
+
+
 def test_sentence_names_what_is_said_and_where() -> None:
     rooms = ["lab", "den", "attic", "cellar", "study"]
     everywhere = tuple(event for one in rooms for event in (drive("", one), say("Lunch!", one)))
     first, second, silent = describe((say("Lunch!"),), (say("Lunch!"), *everywhere), (drive("hall", "lab"),))
     assert first == 'says "Lunch!" in hall and stays where it is'
-    assert second == 'says "Lunch!" in hall, lab, den and 3 more and ends in study'
+    assert second == 'says "Lunch!" in hall, lab, den, attic and 2 more and ends in study'
     assert silent == "says nothing and ends in lab"
     only, _ = describe((say("Lunch!"), *everywhere[:2]), (say("Lunch!"), *everywhere[:2], *everywhere[8:]))
     assert only.startswith('only says "Lunch!" in hall and lab')

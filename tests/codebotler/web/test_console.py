@@ -21,6 +21,7 @@ from codebotler.core.world_file import read_world
 from codebotler.missions.display.view import MissionOrder, SessionView, program_digest
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import known_instructions
+from codebotler.missions.session import MissionSession
 from codebotler.missions.storage import log as mission_log
 from codebotler.missions.storage.log import LogLine, MissionState, MissionSummary
 from codebotler.missions.storage.store import read_missions
@@ -29,7 +30,7 @@ from codebotler.models.open import open_model
 from codebotler.models.recorded import open_recorded
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
-from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotResult
+from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotLostError, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.worlds.room_map import RoomMap
@@ -746,3 +747,64 @@ def test_hold_after_a_stop_outlasts_a_clock_that_is_set_back(tmp_path: Path) -> 
         wait_until(console, lambda view: view.is_over)
         console.begin(MissionOrder(program=HELLO))
         assert console.is_held
+
+
+class LosingRobot(FakeRobot):
+    """A robot that is out of reach in its first skill, and can be stopped again once it is connected anew."""
+
+    is_reachable = True
+
+    @property
+    def failed_stop(self) -> str:
+        return "" if self.is_reachable else "the line is dead"
+
+
+def lose(skill: str, _first: str) -> RobotResult:
+    if skill == "say":
+        raise RobotLostError("the line is dead")
+    return ["hall"] if skill == "get_all_rooms" else "hall"
+
+
+def run_and_lose(console: Console) -> MissionSession:
+    begin_and_approve(console, "def task_program():\n    say('a')\n")
+    assert wait_until(console, lambda view: view.is_over).state is MissionState.FAILED
+    assert console.session is not None
+    console.session.join(10)
+    return console.session
+
+
+def test_stop_reaches_a_robot_that_was_lost(tmp_path: Path) -> None:
+    robot = LosingRobot(lose)
+    with make_console(tmp_path, robot) as console:
+        session = run_and_lose(console)
+        for is_reachable in (False, True):
+            robot.is_reachable, robot.cancels = is_reachable, 0
+            assert console.stop("a person"), "it may still move"
+            wait_until(console, lambda _: robot.cancels > 0 and session.may_move is not robot.is_reachable)
+        assert not console.stop("a person"), "it has stopped"
+
+
+def test_after_a_loss_a_person_must_approve(tmp_path: Path) -> None:
+    with make_console(tmp_path, LosingRobot(lose)) as console:
+        run_and_lose(console)
+        assert not console.is_held
+        console.begin(MissionOrder(program=HELLO))
+        assert console.is_held
+
+
+def test_no_stop_waits_for_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    may_write, writers = threading.Event(), list[threading.Thread]()
+
+    def write_slowly(*_: object) -> None:
+        writers.append(threading.current_thread())
+        may_write.wait(30)
+
+    with make_console(tmp_path, Simulated(WORLD)) as console:
+        begin_and_approve(console, FAR)
+        wait_until(console, lambda view: bool(view.progress.skill))
+        monkeypatch.setattr("os.utime", write_slowly)
+        console.stop("a person", holds=True)
+        assert console.is_held
+        assert wait_until(console, lambda view: view.is_over and bool(writers)).state is MissionState.STOPPED
+        assert threading.current_thread() not in writers
+        may_write.set()

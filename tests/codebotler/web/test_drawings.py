@@ -248,6 +248,15 @@ def test_strips_show_each_kind_of_world_once() -> None:
     assert all(strip.ends_well for strip in shown)
 
 
+def test_only_the_repeated_step_in_its_room_is_marked() -> None:
+    program = "def task_program():\n    say('hi')\n    go_to('kitchen')\n    say('hi')\n"
+    found = check(program, rooms=["hall", "kitchen"])
+    samples = [replace(one, repeated=one.outcome.trace[-1:]) for one in found.samples]
+    shown = strips(replace(found, samples=tuple(samples)))
+    marked = [[deed.is_repeated for deed in scene.deeds] for scene in shown[0].scenes]
+    assert marked == [[False], [True]]
+
+
 def test_wait_in_vain_is_harmless_unless_it_is_a_problem() -> None:
     wait = "def task_program():\n    while not is_in_room('mug'):\n        time.sleep(60)\n"
     found = check(wait, rooms=["hall"])

@@ -35,6 +35,17 @@ class SharedView:
         """The current view."""
         return self._view
 
+    @property
+    def is_stuck(self) -> bool:
+        """Whether a skill still runs after a stop that the robot did not confirm, so the robot may move."""
+        stuck = None if self._mission is None else self._mission.stuck
+        return stuck is not None and stuck.is_alive()
+
+    @property
+    def may_move(self) -> bool:
+        """Whether the robot may still move after the mission, since it was lost or did not confirm a stop."""
+        return self._mission is not None and self._mission.may_move
+
     def events(self, start: int = 0) -> list[LogLine]:
         """Return the events of the mission so far, without the first `start` ones."""
         return self._events[start:]

@@ -143,7 +143,7 @@ class MissionPast:
         done = replace(self.unsure, answer=answer or None)
         trace = (*self.trace, done) if happened else self.trace
         did = "happened" if happened else "did not happen"
-        word = f"a person said that this {did}: {self._unsure_words}"
+        word = f"a person said that in mission {self.mission} this {did}: {self._unsure_words}"
         testimony = "; ".join(filter(None, (self.testimony, word)))
         return replace(self, trace=trace, unsure=None, testimony=testimony)
 

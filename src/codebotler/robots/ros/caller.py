@@ -89,7 +89,8 @@ class RosCaller:
         if self.missing and self.missing.keys() == self.connection.calls.keys():
             worker.leave()
             raise NotReadyError(f"the robot offers no skills: {next(iter(self.missing.values()))}")
-        self._worker, self._stopped, self._in_doubt = worker, False, False
+        self._in_doubt = self._in_doubt and not worker.about["cancelled_all"]
+        self._worker, self._stopped = worker, False
         self.clock.restart()
 
     def _request(self, call: SkillCall, request: WorkerMessage, feedback: Feedback) -> Values:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from codebotler.core.text.words import brief
 from codebotler.simulator.worlds.matching import SOMEBODY, contains
 
+ANSWER_FORM = 'the answer in "{}" to "{}" is "{}"'
+
 
 @dataclass(frozen=True)
 class SampledFact:

@@ -33,7 +33,13 @@ from codebotler.simulator.worlds.matching import (
 )
 from codebotler.simulator.worlds.robot import SimulatedRobot, SkillGuard
 from codebotler.simulator.worlds.room_map import RoomMap
-from codebotler.simulator.worlds.sampled_facts import ExploredRoom, RoomSearch, SampledFact, whereabouts
+from codebotler.simulator.worlds.sampled_facts import (
+    ANSWER_FORM,
+    ExploredRoom,
+    RoomSearch,
+    SampledFact,
+    whereabouts,
+)
 from codebotler.simulator.worlds.simulated_world import NO_SUCH_THING
 
 AS_WRITTEN = SimulationSettings(literals="as-written", matching="longest-name")  # as on a robot
@@ -349,7 +355,7 @@ class SampledRobot(SimulatedRobot):
         if self.answers.get(asked) not in texts:
             self.answers[asked] = self.answer(texts, *asked)
             names = self.room, question, self.answers[asked]
-            self.facts.append(SampledFact('the answer in "{}" to "{}" is "{}"', names))
+            self.facts.append(SampledFact(ANSWER_FORM, names))
         chosen = texts.index(self.answers[asked])
         self.amend(texts[chosen])
         return chosen
