@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from itertools import groupby
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.trace import Event, Outcome, Status, Trace
@@ -115,26 +115,32 @@ def count_conflicts(traces: Iterable[Trace], homes: Iterable[tuple[str, str]] = 
     question may have several answers. `homes` are people and their rooms that no trace names.
     """
     seen = {one for trace in traces for one in _encounters(trace)}
-    met, missed = ({one[:2] for one in seen if one[2] is is_there} for is_there in (True, False))
-    named = {(name, room) for name, room, is_there, is_person, _ in seen if is_there and is_person}
-    named |= {*homes}
-    rooms = Counter(name for name, _ in named if name != SOMEBODY)
-    answers = Counter(one[:2] for one in {(room, *said) for _, room, _, _, said in seen if said})
-    met |= {(SOMEBODY, room) for _, room in named}
+    people = {(one.name, one.room) for one in seen if one.is_there and one.is_person} | {*homes}
+    rooms = Counter(name for name, _ in people if name != SOMEBODY)
+    answers = Counter(said[:2] for said in {(one.room, *one.said) for one in seen if one.said})
+    met = {(one.name, one.room) for one in seen if one.is_there} | {(SOMEBODY, room) for _, room in people}
+    missed = {(one.name, one.room) for one in seen if not one.is_there}
     return len(met & missed) + sum(count - 1 for count in (*rooms.values(), *answers.values()))
 
 
 def people_sought(traces: Iterable[Trace]) -> set[tuple[str, str]]:
     """Return the names of people that runs looked for or asked, each with the room."""
     found = (one for trace in traces for one in _encounters(trace))
-    return {(name, room) for name, room, _, is_person, _ in found if is_person and name != SOMEBODY}
+    return {(one.name, one.room) for one in found if one.is_person and one.name != SOMEBODY}
 
 
-def _encounters(trace: Trace) -> Iterator[tuple[str, str, bool, bool, tuple[str, ...]]]:
-    """Yield each name that the run has not moved: its room, whether it is there, whether it is a person.
+class Encounter(NamedTuple):
+    """A person or thing that a run met in a room, or missed there."""
 
-    For questions, the words and the answer follow.
-    """
+    name: str
+    room: str
+    is_there: bool
+    is_person: bool
+    said: tuple[str, ...]  # a question and its answer, if this person was asked
+
+
+def _encounters(trace: Trace) -> Iterator[Encounter]:
+    """Yield all encounters of a run with people, and with things that it has not moved before."""
     moved: set[str] = set()
     for one in trace:
         name = normalized(one.to or SOMEBODY if one.kind == ASK else one.text)
@@ -142,7 +148,7 @@ def _encounters(trace: Trace) -> Iterator[tuple[str, str, bool, bool, tuple[str,
         is_known = one.kind in {CHECK, PICK} or (one.kind == ASK and bool(one.answer))
         if is_known and name not in moved and not one.failed:
             said = (_plain(one.text), _plain(one.answer or "")) if one.kind == ASK else ()
-            yield name, one.place, one.found is not False, is_person, said
+            yield Encounter(name, one.place, one.found is not False, is_person, said)
         if one.kind in {PICK, PLACE}:
             moved.add(name)
 

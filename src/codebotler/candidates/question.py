@@ -106,8 +106,8 @@ class ClarifyingQuestion:
     @property
     def rejections(self) -> list[str]:
         """Hints for a model, one per option: "the person did not mean a robot that ends in kitchen"."""
-        meant = f"the person did not mean{self.supposition}, a robot that"
-        return [f"{meant.replace(',', '', not self.facts)} {one.difference}" for one in self.options]
+        meant = f"the person did not mean{self.supposition}{',' * bool(self.facts)} a robot that"
+        return [f"{meant} {one.difference}" for one in self.options]
 
     def chosen(self, answer: ClarifyingAnswer) -> CandidateOption | None:
         """Return the option that an answer selects: the first one for `decide`, and None for `none`."""

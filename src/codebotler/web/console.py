@@ -181,9 +181,8 @@ class Console:
 
     def rest_of(self, past: MissionPast, program: str = "", author: str = "") -> MissionOrder:
         """Return the order to continue a mission by `program`, its own if nothing was done, or a model's."""
-        skills = called_skills(
-            parse_leniently(past.program), self.robot.skills
-        )  # none if an agent chose them
+        # A step-by-step mission has no program of its own: the text only describes it.
+        skills = called_skills(parse_leniently(past.program), self.robot.skills)
         if not program and ((past.is_untouched and skills) or not past.instruction):
             program, author = past.program, past.model
             model = past.model if past.model in self.models else ""
