@@ -49,7 +49,8 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the unpacked source archive."""
     folder = tmp_path_factory.mktemp("source")
     with tarfile.open(build_archive("sdist", ROOT, folder / "dist")) as archive:
-        archive.extractall(folder, filter="data")
+        safely = {"filter": "data"} if hasattr(tarfile, "data_filter") else {}  # since Python 3.11.4
+        archive.extractall(folder, **safely)  # type: ignore[arg-type]  # values by the names of parameters
     (unpacked,) = (path for path in folder.iterdir() if path.name != "dist")
     return unpacked
 

@@ -39,6 +39,7 @@ TOO_LONG = f"the contract is longer than {MAX_CONTRACT_CHARACTERS:,} characters;
 MAX_REPORTED_EVENTS = 1_000  # in one report
 READING_PAST = "reading of missions"  # a kind of work
 MAX_WAITING_CALLS = 100  # each event wakes all of them
+MAX_ASKED_PROBLEMS = 20  # in a client's dialog; more are reviewed on the page
 MAX_ASKED_CHARACTERS = 4_000
 """The limit for a program and for its contract in a client's dialog. Longer ones are reviewed on the page."""
 
@@ -145,6 +146,7 @@ class Gatekeeper:
         check = self._report_check(view)
         contract = "" if check is None else check.contract
         is_short = max(len(view.program), len(contract)) <= MAX_ASKED_CHARACTERS
+        is_short = is_short and len(view.problems) <= MAX_ASKED_PROBLEMS
         return self.asks_client and view.can_run and is_short
 
     def check(self, program: str) -> CheckReport:
@@ -248,7 +250,7 @@ class Gatekeeper:
             return view.error or "The program is not ready: call follow_mission, or propose another one."
         if not view.can_run:
             return "This program cannot run. Mend it, and propose it again."
-        why = "Since a person pressed STOP, a" if self.console.is_held else "A"
+        why = "After a STOP or the loss of the robot, a" if self.console.is_held else "A"
         where = f"on the open page, or by the link to {self.page} that was printed at the start"
         if self.may_ask_client(view):
             where = f"in the dialog that run_mission opens, if this client has dialogs, or {where}"

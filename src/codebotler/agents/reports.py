@@ -11,12 +11,10 @@ from codebotler.candidates.question import ClarifyingQuestion
 from codebotler.checking.problems import CheckResult
 from codebotler.core.terminal import shortened, visible_lines
 from codebotler.core.text.phrases import is_question, is_spoken
-from codebotler.core.text.words import elide_list, listed
+from codebotler.core.text.words import listed
 from codebotler.missions.display.view import SessionView
 from codebotler.robots.base import Robot
 from codebotler.web.storyboard import Action, Scene, Strip, strips
-
-MAX_PROBLEMS = 20  # in a dialog
 
 
 class _Report(BaseModel):
@@ -86,7 +84,7 @@ def question(view: SessionView, robot: Robot, contract: str) -> str:
     """Return the text of the dialog to approve a program: its problems, its contract and an example run."""
     rules = listed([shortened(rule.name) for rule in view.rules_in_force])
     where = f" at {shortened(robot.address)}" if robot.address else ""
-    problems = "\n".join(f"- {one}" for one in elide_list([*map(shortened, view.problems)], MAX_PROBLEMS))
+    problems = "\n".join(f"- {shortened(problem)}" for problem in view.problems)
     switched_off = listed([*map(shortened, view.disabled_rules)])
     boards = [] if view.check is None else strips(view.check)
     boards = [board for board in boards if len(board.scenes) > 1 or board.scenes[0].deeds]

@@ -35,7 +35,7 @@ from codebotler.simulator.worlds.matching import SOMEBODY, contains, normalized
 from codebotler.simulator.worlds.room_map import RoomMap
 
 RANDOM_WORLDS, MAX_SHARED_WORLDS = 8, 24  # random worlds, and worlds with those that try further facts
-SETTLED_WORLDS = 16  # added if candidates contradict each other in all of these
+SETTLED_WORLDS = 16  # added if candidates contradict each other in most of these
 ROOM_NUMBER = re.compile(r"\s*\d+$")
 
 
@@ -148,7 +148,8 @@ def cluster_candidates(
         raise UserError(f"{again} would do again what was not meant; give the instruction in other words")
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     people = frozenset(map(normalized, rooms.people))
-    if len(clusters) > 1 and min(conflicts_in_worlds(clusters, people).values()):
+    conflicts = [*map(bool, conflicts_in_worlds(clusters, people).values())]
+    if sum(conflicts) > len(conflicts) / 2:
         more = _run_with_settled_people(worker, clusters, rooms, settings)
         clusters = [one.extended(new, describe(new)) for one, new in zip(clusters, more, strict=True)]
     unwanted_count = len(programs) - rejected - sum(one.size for one in clusters)

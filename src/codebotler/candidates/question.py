@@ -74,6 +74,7 @@ class ClarifyingQuestion:
         facts: the facts of the imagined world that explain the differences, in words.
         total: the number of accepted candidates.
         sample: the number of the imagined world.
+        alike: the number of other candidates that do the same as an option in this world.
         rejected: the number of candidates that the check rejected.
         why_last: why no new programs are written after the answer `none`; empty if some are.
     """
@@ -82,14 +83,18 @@ class ClarifyingQuestion:
     facts: tuple[str, ...]
     total: int
     sample: int
+    alike: int = 0
     rejected: int = 0
     why_last: str = ""
 
     @property
     def left_out(self) -> str:
         """A sentence about missing candidates: "Not shown: 2 programs that ..."; empty if none is missing."""
-        left = self.total - sum(one.size for one in self.options)
-        parts = [f"{counted(left, 'program')} that would do something else"] if left else []
+        left = self.total - sum(one.size for one in self.options) - self.alike
+        parts = (
+            [f"{counted(self.alike, 'program')} like these that would differ otherwise"] if self.alike else []
+        )
+        parts += [f"{counted(left, 'program')} that would do something else"] if left else []
         parts += [f"{counted(self.rejected, 'program')} that the check rejects"] if self.rejected else []
         return f"Not shown: {listed(parts)}." if parts else ""
 
@@ -163,7 +168,9 @@ def question_about(
     why_last = "this is the second question" if is_second else ""
     why_last = "a recorded model writes no new programs" if is_recorded(model) else why_last
     facts = _facts_that_matter(shown, number)
-    return ClarifyingQuestion(tuple(options), facts, groups.total, number, groups.rejected, why_last)
+    others = [one for one in groups.clusters if one not in shown and one.behaviours[number] in behaviours]
+    alike = sum(one.size for one in others)
+    return ClarifyingQuestion(tuple(options), facts, groups.total, number, alike, groups.rejected, why_last)
 
 
 def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:
@@ -174,16 +181,17 @@ def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> lis
     return [*different.values()][:MAX_CANDIDATE_OPTIONS]
 
 
-def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, int, int, int, int]:
+def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, int, int, int, int, int]:
     """Rank a world: by the number of options, their candidates, what a person cares about, and brevity.
 
-    Where the largest cluster does more, a person sees better what it is for: it finds what it looks for.
+    Where an option does more, a person sees better what it is for: it finds what it looks for. The largest
+    cluster counts first.
     """
     first, *others = (one.behaviours[number] for one in shown)
     cares = sum(bool(first.differences(other) & NOTICED_FIRST) for other in others)
-    deeds = sum(one.kind in NOTICED_KINDS for one in shown[0].samples[number].outcome.trace)
-    length = sum(len(one.samples[number].outcome.trace) for one in shown)
-    return len(shown), sum(one.size for one in shown), cares, deeds, -length
+    traces = [one.samples[number].outcome.trace for one in shown]
+    deeds = [sum(event.kind in NOTICED_KINDS for event in trace) for trace in traces]
+    return len(shown), sum(one.size for one in shown), cares, deeds[0], sum(deeds), -sum(map(len, traces))
 
 
 def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[str, ...]:
@@ -193,7 +201,8 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
         drawn = dict.fromkeys(fact for one in shown for fact in one.samples[world].facts if fact.is_random)
         asked = Counter(fact.names[:-1] for fact in drawn if fact.form == ANSWER_FORM)
         # The steps of each option show its answer, if options get different answers to the same words.
-        return [one.sentence for one in drawn if one.form != ANSWER_FORM or asked[one.names[:-1]] == 1]
+        kept = [one for one in drawn if one.form != ANSWER_FORM or asked[one.names[:-1]] == 1]
+        return [one.sentence for one in sorted(kept, key=lambda one: one.is_absence)]
 
     same = [world for world in range(len(shown[0].samples)) if len({o.behaviours[world] for o in shown}) == 1]
     alike = [set(facts(world)) for world in same]
@@ -250,7 +259,7 @@ def _words(key: Aspect, sample: Sample, rooms: Container[str], limits: WordLimit
         return f"{'only ' * bool(said and not telling)}says {_speech(telling or said, limits)}"
     if kind == "moved":
         moves = (one for one in outcome.trace if one.kind in {PICK, PLACE} and normalized(one.text) == name)
-        return _events(moves, f'leaves "{name}" alone')
+        return _events(moves, f'leaves "{name.replace(chr(34), chr(39))}" alone')
     if kind == "asked":
         return _events(
             (one for one in outcome.trace if one.kind == ASK and one.place == name), f"asks nobody in {name}"

@@ -194,16 +194,14 @@ class MissionSession(SharedView):
 
     def stop(self, by: str) -> None:
         """Stop the robot, then all other work. Return once the request has reached the robot."""
-        if self.is_stuck or not self._view.is_over:
+        if self.may_move or not self._view.is_over:
             self._stop_button.press(by)
-        elif self.may_move and self._mission is not None:
-            with suppress(*EXPECTED_ERRORS), Reservation(self._robot, self._home):  # which cancels old goals
-                self._robot.cancel()
-                self._mission.may_move = bool(getattr(self._robot, "failed_stop", ""))
 
-    def stop_soon(self, by: str) -> None:
-        """Stop without waiting, for signal handlers and event loops."""
-        threading.Thread(target=self.stop, args=(by,), daemon=True).start()
+    def stop_soon(self, by: str) -> threading.Thread:
+        """Stop on a new thread, for signal handlers and event loops, and return the thread."""
+        stopping = threading.Thread(target=self.stop, args=(by,), daemon=True)
+        stopping.start()
+        return stopping
 
     def _end_waiting(self) -> None:
         """Wake the session's own thread after a press of the stop button."""

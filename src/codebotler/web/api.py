@@ -216,8 +216,9 @@ def _add_changes(api: APIRouter, console: Console) -> None:
             bool, Query(description="Stop only a program that is approved or runs.")
         ] = False,
     ) -> dict[str, Any]:
-        """Stop the current mission, and return whether there was one to stop."""
-        return {"stopping": console.stop(BY_PAGE, only_moving=only_moving, holds=True)}
+        """Stop the current mission, and return whether there was one, and a warning about a lost robot."""
+        stopping = console.stop(BY_PAGE, only_moving=only_moving, holds=True)
+        return {"stopping": stopping, "warning": console.warning}
 
     @api.get("/missions/{mission}/events", response_class=StreamingResponse)
     async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:

@@ -20,7 +20,7 @@ from codebotler.core.files import make_folder
 from codebotler.core.program import called_skills, parse_leniently
 from codebotler.core.world import World
 from codebotler.missions.display.view import MissionOrder, SessionView
-from codebotler.missions.display.wording import BY_PAGE
+from codebotler.missions.display.wording import BY_PAGE, capitalize
 from codebotler.missions.mission import BY_SHUTDOWN, STOP_GRACE_SECONDS, MissionError
 from codebotler.missions.recovery import PriorApproval, past_to_recover
 from codebotler.missions.session import MissionSession
@@ -82,7 +82,11 @@ class Console:
         which = quote(f"{robot.name} {normalize_address(robot.address)}", safe="", errors="replace")
         self._hold_file = home / "robots" / f"{which[:200]}.held"  # changed when a person presses STOP
         self._stopped: MissionSession | None = None  # the session at the last hold in this process
-        self._holds = False
+        self._holds, self._writer = (
+            False,
+            threading.Thread(),
+        )  # the hold in memory, and the thread that writes it
+        self._lost: MissionSession | None = None  # whose robot may still move
         self._began = 0.0  # the time at which the current session began
 
     def __enter__(self) -> Self:
@@ -99,8 +103,13 @@ class Console:
         with self._lock:
             session, self._may_recover = self.session, None
             self._end_hold()
+            lost = self._lost
+        if lost is not None:
+            lost.stop_soon(BY_SHUTDOWN).join(STOP_GRACE_SECONDS)
+        if self._writer.is_alive():
+            self._writer.join(CLEANUP_SECONDS)
         is_checking = self._checking.locked() or (session is not None and bool(session.view.busy))
-        if session is not None:
+        if session is not None and session is not lost:
             session.stop(BY_SHUTDOWN)
         if is_checking:
             SHARED_POOL.end()  # else a check delays the end of this process
@@ -149,8 +158,6 @@ class Console:
             if before is not None and before.is_stuck:
                 raise MissionError(f"a skill of mission {before.view.id} has not ended; check the robot")
             self._end_hold()
-            if before is not None and before.may_move:
-                self._hold(before)
             if order.past is not None:
                 self.unfinished = ""
             elif before is not None and before.view.progress.has_begun:
@@ -161,7 +168,7 @@ class Console:
                 order,
                 open_model=self.open_model,
                 rules=self.rules,
-                changed=self.notifier.change,
+                changed=self._change,
                 number=before.view.number + 1 if before else 1,
                 before=before,
                 world=self.world,
@@ -169,7 +176,7 @@ class Console:
             )
             self._began = time.time()
             session.start()
-        if before is not None:
+        if before is not None and not before.view.is_over:
             before.stop_soon("another instruction")
         self.interrupted = ()
         self.notifier.change()
@@ -234,7 +241,7 @@ class Console:
         session = self.session
         if session is None or not session.is_approved_by_person or session is self._stopped:
             return
-        self._holds = False
+        self._holds, self._lost = False, None
         with suppress(OSError):
             if self._began > self._hold_file.stat().st_mtime:
                 self._hold_file.unlink()
@@ -247,18 +254,32 @@ class Console:
     def stop(self, by: str, *, only_moving: bool = False, holds: bool = False) -> bool:
         """Ask the current mission to stop. Return at once whether there was a mission to stop.
 
-        `only_moving` spares a mission without approval. With `holds`, a person must approve the next one.
+        A robot that was lost, or did not confirm a stop, is stopped again. `only_moving` spares a mission
+        without approval if no robot was lost. With `holds`, a person must approve the next one.
         """
         with self._lock:
             session, self._may_recover = self.session, None
-            may_move = session is not None and session.may_move
-            stops = may_move or (session is not None and session.view.is_approved)
-            is_late = session is None or (session.view.is_over and not may_move)
-            if session is not None and not is_late and (stops or not only_moving):
-                session.stop_soon(by)
+            is_active = session is not None and not session.view.is_over
+            stops = self._lost is not None or (session is not None and session.view.is_approved)
+            target = session if is_active else self._lost
+            if target is not None and (stops or not only_moving):
+                target.stop_soon(by)
             if holds and (stops or not only_moving):
                 self._hold(session)
-        return not is_late and (stops or not only_moving)
+        return target is not None and (stops or not only_moving)
+
+    @property
+    def warning(self) -> str:
+        """A sentence about a robot that was lost and may still move; empty if there is none."""
+        return "" if self._lost is None else capitalize(self._lost.view.reason)
+
+    def _change(self) -> None:
+        """Wake all viewers. Once a robot is lost, have a person approve the next mission."""
+        session = self.session
+        if session is not None and session.may_move and session is not self._lost:
+            self._lost = session
+            self._hold(session)
+        self.notifier.change()
 
     def _hold(self, session: MissionSession | None) -> None:
         """Have a person approve the mission after this session."""
@@ -269,7 +290,8 @@ class Console:
                 self._hold_file.touch()
                 os.utime(self._hold_file)
 
-        threading.Thread(target=write, daemon=True).start()  # no STOP waits for the disk
+        self._writer = threading.Thread(target=write, daemon=True)  # no STOP waits for the disk
+        self._writer.start()
 
     def check(
         self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()

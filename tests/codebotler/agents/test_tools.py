@@ -1146,7 +1146,7 @@ def test_a_persons_stop_outlives_the_process(tmp_path: Path) -> None:
 
     async def act(agent: Agent) -> None:
         proposed = await agent.call("propose_mission", program=QUIET)
-        assert "pressed STOP" in proposed["next"]
+        assert "After a STOP" in proposed["next"]
         approve(again)
         await wait_until(again, lambda view: view.is_over)
 

@@ -82,6 +82,26 @@ def test_a_world_in_which_the_most_frequent_behaviour_does_something_is_preferre
     assert ask_about(cluster(2, "a", drives, (*drives, *ONE)), cluster(1, "b", TWO, TWO)).sample == 1
 
 
+def test_a_world_in_which_all_options_do_something_is_preferred() -> None:
+    assert ask_about(cluster(2, "a", ONE, ONE), cluster(1, "b", (), TWO)).sample == 1
+
+
+def test_options_that_are_alike_in_the_world_are_told_apart_from_others() -> None:
+    three = cluster(3, "a", ONE, ONE), cluster(2, "b", TWO, TWO), cluster(1, "c", ONE, TWO)
+    question = ask_about(*three)
+    assert (len(question.options), question.alike) == (2, 1)
+    assert "something else" not in question.left_out
+
+
+def test_facts_that_hold_come_first() -> None:
+    absent = whereabouts("ann", "lab", is_there=False)
+    one, other = (
+        replace(each, samples=(replace(each.samples[0], facts=(absent, MUG)),))
+        for each in (cluster(1, "a", ONE), cluster(1, "b", TWO))
+    )
+    assert ask_about(one, other).facts == (MUG.sentence, absent.sentence)
+
+
 def test_difference_in_statements_is_preferred_to_one_in_own_skills() -> None:
     waves = (Event("wave", "left", place="hall"),)
     assert ask_about(cluster(1, "a", waves, (*ONE, *ONE)), cluster(1, "b", (), TWO)).sample == 1

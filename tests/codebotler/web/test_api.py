@@ -176,14 +176,14 @@ def test_a_stop_ends_the_current_mission(server: PageServer) -> None:
     robot = server.call("GET", "/api/robot?once=over").data
     assert (robot["is_over"], robot["state"]) == (True, "stopped")
     assert time.monotonic() - began < 2
-    assert server.call("POST", "/api/stop").data == {"stopping": False}
+    assert server.call("POST", "/api/stop").data == {"stopping": False, "warning": ""}
 
 
 def test_a_key_stops_only_a_robot_that_runs(server: PageServer) -> None:
     begin(server, HELLO)
-    assert server.call("POST", "/api/stop?only_moving=true").data == {"stopping": False}
+    assert server.call("POST", "/api/stop?only_moving=true").data == {"stopping": False, "warning": ""}
     assert server.call("GET", "/api/robot").data["state"] == "checked"
-    assert server.call("POST", "/api/stop").data == {"stopping": True}
+    assert server.call("POST", "/api/stop").data == {"stopping": True, "warning": ""}
 
 
 @pytest.mark.slow

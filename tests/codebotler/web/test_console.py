@@ -749,16 +749,6 @@ def test_hold_after_a_stop_outlasts_a_clock_that_is_set_back(tmp_path: Path) -> 
         assert console.is_held
 
 
-class LosingRobot(FakeRobot):
-    """A robot that is out of reach in its first skill, and can be stopped again once it is connected anew."""
-
-    is_reachable = True
-
-    @property
-    def failed_stop(self) -> str:
-        return "" if self.is_reachable else "the line is dead"
-
-
 def lose(skill: str, _first: str) -> RobotResult:
     if skill == "say":
         raise RobotLostError("the line is dead")
@@ -773,23 +763,45 @@ def run_and_lose(console: Console) -> MissionSession:
     return console.session
 
 
-def test_stop_reaches_a_robot_that_was_lost(tmp_path: Path) -> None:
-    robot = LosingRobot(lose)
+def test_each_press_reaches_a_robot_that_was_lost(tmp_path: Path) -> None:
+    robot = FakeRobot(lose)
     with make_console(tmp_path, robot) as console:
-        session = run_and_lose(console)
-        for is_reachable in (False, True):
-            robot.is_reachable, robot.cancels = is_reachable, 0
-            assert console.stop("a person"), "it may still move"
-            wait_until(console, lambda _: robot.cancels > 0 and session.may_move is not robot.is_reachable)
-        assert not console.stop("a person"), "it has stopped"
+        run_and_lose(console)
+        assert "the line is dead" in console.warning
+        for _ in range(2):
+            cancels = robot.cancels
+            assert console.stop("a person", only_moving=True), "it may still move"
+            wait_until(console, lambda _, before=cancels: robot.cancels > before)  # type: ignore[misc]  # mypy does not infer such lambdas
+        known: dict[str, RobotResult] = {"get_all_rooms": ["hall"], "get_current_location": "hall"}
+        robot.answer = lambda skill, _: known.get(skill)
+        console.begin(MissionOrder(program=HELLO))
+        wait_until(console, lambda view: view.may_be_approved)
+        time.sleep(0.05)
+        assert robot.cancels == 0, "the next mission is not stopped with the lost one"
+        assert console.stop("a person", only_moving=True), "a waiting mission is connected to this robot"
+        wait_until(console, lambda view: view.is_over)
+        begin_and_approve(console, "def task_program():\n    say('a')\n")
+        wait_until(console, lambda view: view.is_over)
+        begin_and_check(console)
+        assert console.warning == "", "a person has approved a mission since"
 
 
 def test_after_a_loss_a_person_must_approve(tmp_path: Path) -> None:
-    with make_console(tmp_path, LosingRobot(lose)) as console:
+    with make_console(tmp_path, FakeRobot(lose)) as console:
         run_and_lose(console)
-        assert not console.is_held
+        assert console.is_held
+        console.stop("an agent")
         console.begin(MissionOrder(program=HELLO))
         assert console.is_held
+    wait_until(console, lambda _: make_console(tmp_path, FakeRobot(lose)).is_held)
+
+
+def test_end_stops_a_robot_that_was_lost(tmp_path: Path) -> None:
+    robot = FakeRobot(lose)
+    with make_console(tmp_path, robot) as console:
+        run_and_lose(console)
+        cancels = robot.cancels
+    assert robot.cancels > cancels
 
 
 def test_no_stop_waits_for_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -153,18 +153,22 @@ class RosCaller:
             return self._worker, self._number
 
     def cancel(self) -> None:
-        """Have the worker cancel the goal. If the worker hangs, start a new one that cancels all goals."""
+        """Have the worker cancel the goal. If it hangs or is gone, have a new one cancel all goals."""
         has_lock = self._send_lock.acquire(timeout=CANCEL_SECONDS)  # a hanging worker can block its owner
         try:
             self._stopped = True
             worker = self._worker
             self.clock.stop()
-            if worker is None or (has_lock and worker.cancel(CANCEL_SECONDS)):
+            if worker is not None and has_lock and worker.cancel(CANCEL_SECONDS):
                 return
         finally:
             if has_lock:
                 self._send_lock.release()
-        self._rescue(worker)
+        if worker is not None:
+            self._rescue(worker)
+        elif self._in_doubt:
+            with self._rescue_lock:
+                self._cancel_all()
 
     def disconnect(self) -> None:
         """Have the worker cancel its goal and exit."""
@@ -198,15 +202,19 @@ class RosCaller:
                 return NOT_CANCELLED if self._in_doubt else "all goals were cancelled"
             worker.kill()
             self._worker, self._in_doubt = None, True
-            try:
-                other = self._start(cancel_all=True)
-            except NotReadyError as error:
-                return f"its goals could not be cancelled ({error.sentence}): {STOP_BY_HAND}"
-            other.leave()
-            if not other.about["cancelled_all"]:
-                return NOT_CANCELLED
-            self._in_doubt = False
-            return "another worker has cancelled all goals"
+            return self._cancel_all()
+
+    def _cancel_all(self) -> str:
+        """Have a new worker cancel all goals, and return a clause on the outcome."""
+        try:
+            other = self._start(cancel_all=True)
+        except NotReadyError as error:
+            return f"its goals could not be cancelled ({error.sentence}): {STOP_BY_HAND}"
+        other.leave()
+        if not other.about["cancelled_all"]:
+            return NOT_CANCELLED
+        self._in_doubt = False
+        return "another worker has cancelled all goals"
 
 
 def calls_data(connection: Connection) -> WorkerMessage:

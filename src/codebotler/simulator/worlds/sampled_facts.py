@@ -25,6 +25,11 @@ class SampledFact:
     is_random: bool = True
 
     @property
+    def is_absence(self) -> bool:
+        """Whether somebody or something is not in a room."""
+        return self.form.startswith("nobody") or " is not in " in self.form
+
+    @property
     def sentence(self) -> str:
         """The fact in words. Quotes in a name become single ones, so that they do not end its quotation."""
         names = map(brief, self.names)

@@ -46,9 +46,11 @@
     if (!onlyMoving) say("Sending the stop …", "busy");
     try {
       const answer = await fetch(`${stopAt}?only_moving=${onlyMoving}`, { method: "POST" });
-      const { stopping, detail } = await answer.json();
+      const { stopping, warning, detail } = await answer.json();
       if (!answer.ok) throw new Refused(detail);
-      if (stopping) {
+      if (warning) {
+        say(`${warning} The stop was sent again.`, "bad");
+      } else if (stopping) {
         say("Stop sent. Waiting for the robot to confirm …", "busy");
         await watch(which);
       } else if (!onlyMoving) {
