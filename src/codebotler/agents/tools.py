@@ -33,12 +33,7 @@ from codebotler.agents.dialogs import (
     read_last_past,
 )
 from codebotler.agents.gatekeeper import MAX_REPORTED_EVENTS, Gatekeeper
-from codebotler.agents.reports import (
-    CheckReport,
-    MissionReport,
-    RobotReport,
-    SkillOutcome,
-)
+from codebotler.agents.reports import CheckReport, MissionReport, RobotReport, SkillOutcome
 from codebotler.core.errors import UserError
 from codebotler.missions.authoring import ModelAuthor, prompt_of
 from codebotler.missions.display.view import MissionOrder, SessionView

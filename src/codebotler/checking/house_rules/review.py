@@ -13,18 +13,7 @@ from codebotler.core.skills.kinds import GOTO, PICK, PLACE
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.trace import Option, Trace
 from codebotler.core.world import World
-from codebotler.rtl import (
-    And,
-    EventPattern,
-    Exists,
-    Formula,
-    Last,
-    Not,
-    Or,
-    Regex,
-    Scope,
-    TextPattern,
-)
+from codebotler.rtl import And, EventPattern, Exists, Formula, Last, Not, Or, Regex, Scope, TextPattern
 from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.sample_strings import distinct_strings

@@ -23,13 +23,7 @@ from codebotler.core.trace import (
 )
 from codebotler.core.world import World
 from codebotler.missions.display.progress import Progress
-from codebotler.missions.storage.log import (
-    LogLine,
-    MissionState,
-    MissionSummary,
-    find_skill_end,
-    read_events,
-)
+from codebotler.missions.storage.log import LogLine, MissionState, MissionSummary, find_skill_end, read_events
 from codebotler.missions.storage.store import find_mission, find_rest
 from codebotler.robots.simulated import SIMULATION
 from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot

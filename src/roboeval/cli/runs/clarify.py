@@ -11,13 +11,7 @@ import typer
 
 from codebotler.core.text.words import counted
 from roboeval.cli.inputs import load
-from roboeval.cli.options import (
-    HouseRulesOption,
-    JsonOption,
-    SourceArgument,
-    SuiteOption,
-    WorkersOption,
-)
+from roboeval.cli.options import HouseRulesOption, JsonOption, SourceArgument, SuiteOption, WorkersOption
 from roboeval.cli.output import note, print_json, print_rich, show_progress
 
 if TYPE_CHECKING:

@@ -17,13 +17,7 @@ from codebotler.core.text.words import brief
 from codebotler.models.base import Reply
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt, prompt_for, template_hash
-from roboeval.evaluation.runs.completions import (
-    Completion,
-    CompletionKey,
-    name_of,
-    read_completions,
-    row_for,
-)
+from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of, read_completions, row_for
 from roboeval.evaluation.runs.folder import RunFolder, load_json_object
 from roboeval.suites.load import Suite
 
