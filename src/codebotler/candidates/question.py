@@ -92,7 +92,9 @@ class ClarifyingQuestion:
         """A sentence about missing candidates: "Not shown: 2 programs that ..."; empty if none is missing."""
         left = self.total - sum(one.size for one in self.options) - self.alike
         parts = (
-            [f"{counted(self.alike, 'program')} like these that would differ otherwise"] if self.alike else []
+            [f"{counted(self.alike, 'program')} that would do the same here, but not always"]
+            if self.alike
+            else []
         )
         parts += [f"{counted(left, 'program')} that would do something else"] if left else []
         parts += [f"{counted(self.rejected, 'program')} that the check rejects"] if self.rejected else []

@@ -270,8 +270,10 @@ class Console:
 
     @property
     def warning(self) -> str:
-        """A sentence about a robot that was lost and may still move; empty if there is none."""
-        return "" if self._lost is None else capitalize(self._lost.view.reason)
+        """A sentence about a robot that was lost and may still move, until a person approves a mission."""
+        lost, session = self._lost, self.session
+        is_later = session is not None and session.is_approved_by_person and session is not lost
+        return "" if lost is None or is_later else capitalize(lost.view.reason)
 
     def _change(self) -> None:
         """Wake all viewers. Once a robot is lost, have a person approve the next mission."""
