@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
-from codebotler.checking.sampled import CheckSettings, UnwantedCheckError, first_samplers
+from codebotler.checking.sampled import CheckSettings, first_samplers
 from codebotler.core.errors import RobotError
 from codebotler.core.skills.calling import SKILL_FAILED
 from codebotler.core.skills.table import SkillTable
@@ -20,13 +20,7 @@ from codebotler.simulator.worlds.sampled_robot import SampledRobot
 
 
 def remaining_outcomes(
-    begun: str,
-    room_map: RoomMap,
-    skills: SkillTable,
-    *,
-    first: int = 0,
-    worker: Worker | None = None,
-    is_wanted: Callable[[], bool] = lambda: True,
+    begun: str, room_map: RoomMap, skills: SkillTable, *, first: int = 0, worker: Worker | None = None
 ) -> tuple[Outcome, ...]:
     """Return what an interrupted program would still do, once for each sampled world where it does not fail.
 
@@ -38,18 +32,14 @@ def remaining_outcomes(
         skills: the robot's skills.
         first: the number of steps that the robot had done when the program began.
         worker: a worker that no other thread uses; by default one of the shared pool.
-        is_wanted: called before each run, or else UnwantedCheckError is raised.
     """
     if worker is None:
         pool = shared_pool()
-        run = partial(remaining_outcomes, begun, room_map, skills, first=first, is_wanted=is_wanted)
-        return pool.call(lambda: run(worker=pool.here()))
+        return pool.call(lambda: remaining_outcomes(begun, room_map, skills, first=first, worker=pool.here()))
     settings, found = CheckSettings(skills=skills), []
     robots: list[RepeatingRobot] = []  # of all runs, since a run is repeated if its process is lost
 
     def begin(sampler: FactSampler) -> RepeatingRobot:
-        if not is_wanted():
-            raise UnwantedCheckError
         robots.append(RepeatingRobot(room_map, sampler, settings, first))
         return robots[-1]
 

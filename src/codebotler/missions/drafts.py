@@ -37,7 +37,7 @@ def examine_draft(
     )
     if view.past is not None:
         begun, before = view.past.program, view.past.before
-        left = remaining_outcomes(begun, found.room_map, skills, first=before, is_wanted=is_wanted)
+        left = remaining_outcomes(begun, found.room_map, skills, first=before)
         found = hold_to_past(found, begun, left)
     if order.drive is not None and program == order.program:
         found = replace(found, contract=order.contract, proofs=(), samples=())

@@ -93,7 +93,7 @@ class OwnRobot:
             self._loop = asyncio.new_event_loop()
             self._thread = threading.Thread(target=_run, args=(self._loop,), daemon=True)
             self._thread.start()
-        self._stopped, self.failed_stop = False, ""
+        self._stopped, self._is_lost, self.failed_stop = False, False, ""
         connect = getattr(self._body, "connect", None)
         if connect is not None:
             try:
@@ -128,6 +128,7 @@ class OwnRobot:
                 raise
             if kind in dict(row.fails):
                 raise RobotError(kind, str(error) or f"{skill}: {dict(row.fails)[kind]}") from error
+            self._is_lost = True  # an earlier `stop` may not have reached the robot
             self.cancel()
             failed = f"; {self.failed_stop}" if self.failed_stop else ""
             raise RobotLostError(f"{self.name}.{skill} failed: {_describe(error)}{failed}") from error
@@ -151,11 +152,11 @@ class OwnRobot:
     def cancel(self) -> None:
         """Call the object's `stop`, and cancel the running method if it is async.
 
-        Another press calls `stop` again if it failed before, or if the method is still running.
+        Another press calls `stop` again if it failed before, or if the method failed or is still running.
         """
         with self._stop_lock:
             is_calling = not self._stop_returned.is_set()  # on another thread
-            is_done = self._stopped and not (self._is_busy or self.failed_stop)
+            is_done = self._stopped and not (self._is_busy or self._is_lost or self.failed_stop)
             self._stopped = True
             if not (is_calling or is_done):
                 self._stop_returned.clear()

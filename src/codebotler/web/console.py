@@ -87,6 +87,7 @@ class Console:
             threading.Thread(),
         )  # the hold in memory, and the thread that writes it
         self._lost: MissionSession | None = None  # whose robot may still move
+        self._stopping = threading.Thread()  # sends a stop to that robot
         self._began = 0.0  # the time at which the current session began
 
     def __enter__(self) -> Self:
@@ -103,7 +104,7 @@ class Console:
         with self._lock:
             session, self._may_recover = self.session, None
             self._end_hold()
-            lost = self._lost
+            lost = self._forget_loss()
         if lost is not None:
             lost.stop_soon(BY_SHUTDOWN).join(STOP_GRACE_SECONDS)
         if self._writer.is_alive():
@@ -155,9 +156,12 @@ class Console:
                 raise MissionError(f"mission {before.view.id} is {before.view.state}; stop it first")
             if after is not None and after is not self._may_recover:
                 raise MissionError("somebody pressed STOP, or began another mission")
+            if self._stopping.is_alive():
+                raise MissionError("a stop of the robot has not returned; check the robot")
             if before is not None and before.is_stuck:
                 raise MissionError(f"a skill of mission {before.view.id} has not ended; check the robot")
             self._end_hold()
+            self._forget_loss()
             if order.past is not None:
                 self.unfinished = ""
             elif before is not None and before.view.progress.has_begun:
@@ -241,7 +245,7 @@ class Console:
         session = self.session
         if session is None or not session.is_approved_by_person or session is self._stopped:
             return
-        self._holds, self._lost = False, None
+        self._holds = False
         with suppress(OSError):
             if self._began > self._hold_file.stat().st_mtime:
                 self._hold_file.unlink()
@@ -259,21 +263,29 @@ class Console:
         """
         with self._lock:
             session, self._may_recover = self.session, None
+            lost = self._forget_loss()
+            stops = not only_moving or lost is not None or (session is not None and session.view.is_approved)
             is_active = session is not None and not session.view.is_over
-            stops = self._lost is not None or (session is not None and session.view.is_approved)
-            target = session if is_active else self._lost
-            if target is not None and (stops or not only_moving):
-                target.stop_soon(by)
-            if holds and (stops or not only_moving):
+            if session is not None and is_active and stops:
+                session.stop_soon(by)
+            if lost is not None:
+                self._stopping = lost.stop_soon(by)
+            if holds and stops:
                 self._hold(session)
-        return target is not None and (stops or not only_moving)
+        return stops and (is_active or lost is not None)
+
+    def _forget_loss(self) -> MissionSession | None:
+        """Forget a lost robot once a person has approved a later mission. Return who lost it, if anybody."""
+        session = self.session
+        if session is not None and session.is_approved_by_person and session is not self._lost:
+            self._lost = None
+        return self._lost
 
     @property
     def warning(self) -> str:
         """A sentence about a robot that was lost and may still move, until a person approves a mission."""
-        lost, session = self._lost, self.session
-        is_later = session is not None and session.is_approved_by_person and session is not lost
-        return "" if lost is None or is_later else capitalize(lost.view.reason)
+        lost = self._forget_loss()
+        return "" if lost is None else capitalize(lost.view.reason)
 
     def _change(self) -> None:
         """Wake all viewers. Once a robot is lost, have a person approve the next mission."""

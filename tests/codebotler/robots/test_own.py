@@ -191,6 +191,26 @@ def test_another_press_stops_a_robot_that_missed_the_first_one(write: Write) -> 
     assert robot.perform("get_current_location", ()) == "2"
 
 
+def test_robot_whose_method_failed_is_stopped_at_each_press(write: Write) -> None:
+    robot = write(
+        """
+    calls = 0
+    def stop(self): self.calls += 1
+    def rooms(self): return ["hall"]
+    def say(self, message): raise ConnectionError("no route")
+    def get_current_location(self): return str(self.calls)
+"""
+    )
+    robot.connect()
+    with pytest.raises(RobotLostError):
+        robot.perform("say", ["hello"])
+    robot.disconnect()
+    robot.cancel()
+    robot.cancel()
+    robot.connect()
+    assert robot.perform("get_current_location", ()) == "3"
+
+
 STOPS_BADLY = {
     "raises": "def stop(self): self.event.set(); raise RuntimeError('the brake failed')",
     "raises late": "def stop(self): self.event.set(); time.sleep(1); raise OSError('the brake failed')",

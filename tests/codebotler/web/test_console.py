@@ -781,10 +781,38 @@ def test_each_press_reaches_a_robot_that_was_lost(tmp_path: Path) -> None:
         assert console.stop("a person", only_moving=True), "a waiting mission is connected to this robot"
         wait_until(console, lambda view: view.is_over)
         begin_and_approve(console, "def task_program():\n    say('a')\n")
-        wait_until(console, lambda view: view.is_over)
         assert console.warning == ""
+        console.stop("a person", holds=True)
+        wait_until(console, lambda view: view.is_over)
         begin_and_check(console)
         assert console.warning == "", "a person has approved a mission since"
+        assert not console.stop("a person", only_moving=True), "the next one only waits"
+
+
+def test_nothing_begins_while_a_stop_of_a_lost_robot_is_under_way(tmp_path: Path) -> None:
+    may_return = threading.Event()
+    robot = FakeRobot(lose)
+    with make_console(tmp_path, robot) as console:
+        run_and_lose(console)
+        robot.cancel = lambda: may_return.wait(30) and None  # type: ignore[assignment,method-assign]  # hangs
+        console.stop("a person")
+        with pytest.raises(MissionError):
+            console.begin(MissionOrder(program=HELLO))
+        may_return.set()
+        console._stopping.join(10)
+        console.begin(MissionOrder(program=HELLO))
+
+
+def test_stop_reaches_a_lost_robot_while_the_next_mission_connects(tmp_path: Path) -> None:
+    robot = FakeRobot(lose)
+    with make_console(tmp_path, robot) as console:
+        run_and_lose(console)
+        cancels, may_connect = robot.cancels, threading.Event()
+        robot.connect = lambda: may_connect.wait(30) and None  # type: ignore[assignment,method-assign]  # slowly
+        console.begin(MissionOrder(program=HELLO))
+        console.stop("a person")
+        wait_until(console, lambda _: robot.cancels > cancels, seconds=10)
+        may_connect.set()
 
 
 def test_after_a_loss_a_person_must_approve(tmp_path: Path) -> None:
