@@ -82,10 +82,8 @@ class Console:
         which = quote(f"{robot.name} {normalize_address(robot.address)}", safe="", errors="replace")
         self._hold_file = home / "robots" / f"{which[:200]}.held"  # changed when a person presses STOP
         self._stopped: MissionSession | None = None  # the session at the last hold in this process
-        self._holds, self._writer = (
-            False,
-            threading.Thread(),
-        )  # the hold in memory, and the thread that writes it
+        self._holds = False  # whether there is a hold that may not be on the disk yet
+        self._writer = threading.Thread()  # writes it
         self._lost: MissionSession | None = None  # whose robot may still move
         self._stopping = threading.Thread()  # sends a stop to that robot
         self._began = 0.0  # the time at which the current session began
