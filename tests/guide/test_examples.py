@@ -1,5 +1,6 @@
 """Every example runs and prints its result."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -22,8 +23,9 @@ def test_every_example_is_listed() -> None:
 
 
 @pytest.mark.parametrize("name", SHOWS)
-def test_example_prints_its_result(name: str) -> None:
+def test_example_prints_its_result(name: str, tmp_path: Path) -> None:
     command = [sys.executable, str(EXAMPLES / name)]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    apart = os.environ | {"CODEBOTLER_HOME": str(tmp_path)}  # another tool may use the robot in the usual home
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, env=apart)
     assert ended.returncode == 0, ended.stderr
     assert SHOWS[name] in ended.stdout

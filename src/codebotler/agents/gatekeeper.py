@@ -101,8 +101,9 @@ class Gatekeeper:
         """Return the current session if its program has this digest, or else raise MissionError."""
         session = self.console.session
         if session is None or session.view.is_over:
-            ended = "" if session is None else f"; mission {session.view.id} is {session.view.phase}"
-            raise MissionError(f"no mission is waiting or running{ended}; propose one")
+            view = SessionView() if session is None else session.view
+            why = f"; mission {view.id} is {view.phase}" if view.id else view.error and f"; {view.error}"
+            raise MissionError(f"no mission is waiting or running{why}; propose one")
         if session.view.digest != digest:
             raise MissionError("the current mission has another program; follow_mission shows its digest")
         return session

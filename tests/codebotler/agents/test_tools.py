@@ -37,6 +37,7 @@ from codebotler.models.base import Reply, TextListener, ignore_text
 from codebotler.models.recorded import open_recorded
 from codebotler.prompts import Prompt
 from codebotler.robots.base import RobotLostError, RobotResult
+from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
 from codebotler.simulator.guard.house_rule import Rule
@@ -236,6 +237,17 @@ def test_nothing_runs_until_a_person_approves_on_the_page(gatekeeper: Gatekeeper
         assert "no mission is waiting" in await agent.fails("run_mission", digest=proposed["digest"])
 
     use(gatekeeper, act)
+
+
+def test_agent_is_told_why_mission_did_not_begin(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        proposed = await agent.call("propose_mission", program=HELLO)
+        assert (proposed["is_over"], proposed["mission"]) == (True, "")
+        assert "another tool" in proposed["reason"]
+        assert "another tool" in await agent.fails("run_mission", digest="0")
+
+    with Reservation(gatekeeper.console.robot, gatekeeper.console.home):
+        use(gatekeeper, act)
 
 
 @pytest.mark.slow
