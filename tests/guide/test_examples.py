@@ -25,7 +25,7 @@ def test_every_example_is_listed() -> None:
 @pytest.mark.parametrize("name", SHOWS)
 def test_example_prints_its_result(name: str, tmp_path: Path) -> None:
     command = [sys.executable, str(EXAMPLES / name)]
-    apart = os.environ | {"CODEBOTLER_HOME": str(tmp_path)}  # another tool may use the robot in the usual home
+    apart = os.environ | {"CODEBOTLER_HOME": str(tmp_path)}  # where no other tool uses the robot
     ended = subprocess.run(command, capture_output=True, text=True, check=False, env=apart)
     assert ended.returncode == 0, ended.stderr
     assert SHOWS[name] in ended.stdout

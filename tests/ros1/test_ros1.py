@@ -369,6 +369,21 @@ def test_robot_that_was_left_in_doubt_is_cleared_at_the_next_connection(graph: G
         other.disconnect()
 
 
+def test_another_press_cancels_all_goals_though_none_is_in_doubt(graph: Graph) -> None:
+    """Only a lost robot is asked so, and another client may have moved it since."""
+    server = graph.serve(GO_TO, SAY)
+    robot, environment = graph.robot(), {"ROS_MASTER_URI": graph.uri}
+    options = Options(skills=FEW)
+    other = RosRobot("ros1", graph.uri, "ros1_worker.py", options, environment, node="somebody_else")
+    other.connect()
+    with run_in_thread(lambda: other.perform("go_to", ["never"])) as ended:
+        server.expect("goal", "never")
+        robot.cancel()
+        server.expect("cancel", "never")
+    assert isinstance(ended["error"], CancelledError)
+    other.disconnect()
+
+
 CANCELLED = """
 from channel import serve
 from ros1_worker import Ros1Worker

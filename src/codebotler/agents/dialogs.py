@@ -101,6 +101,9 @@ def ask_whether(
     return Elicit(asked, StepWord)  # without the robot's own word, since an agent may not occupy the robot
 
 
+AFTER_HOLD = "After a STOP or a lost robot, your yes also lets agents act within their contract again."
+
+
 class ProposedProgram(NamedTuple):
     """A mission to approve, with the problems and switched-off rules that the person sees."""
 
@@ -126,7 +129,10 @@ def ask_person(
     may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)
     if not may_ask or gatekeeper.approves_alone(session):
         return NotAsked()
-    return Elicit(question(view, gatekeeper.console.robot, gatekeeper.contract_text(view.contract)), Consent)
+    text = question(view, gatekeeper.console.robot, gatekeeper.contract_text(view.contract))
+    if gatekeeper.console.is_held:
+        text = f"{gatekeeper.console.warning}\n{AFTER_HOLD}\n\n{text}".lstrip()
+    return Elicit(text, Consent)
 
 
 # --- the agent and its client

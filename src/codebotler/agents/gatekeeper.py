@@ -209,7 +209,7 @@ class Gatekeeper:
             reason=view.reason or view.error,
             digest=view.digest,
             check=self._report_check(view),
-            remarks=[*view.unknown_rooms, *view.remarks],
+            remarks=[*view.unknown_rooms, *view.remarks, *filter(None, [self.console.warning])],
             events=[text for text in map(event_text, events[after:seen]) if text],
             event_count=seen,
             done_before=[] if past is None else past.steps,

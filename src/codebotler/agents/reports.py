@@ -96,6 +96,7 @@ def question(view: SessionView, robot: Robot, contract: str) -> str:
         f"It says: {shortened(view.instruction)}" if view.instruction else "",
         f"It does the rest of mission {view.past.mission}, which ended early." if view.past else "",
         f"At most, the program can do this:\n{visible_lines(contract)}" if contract else "",
+        "" if view.check is None else view.check.assumption,
         f"For example:\n{_board_text(boards[0])}" if boards else "",
         f"Mission {view.id}, digest {view.digest}, program:\n{visible_lines(view.program.strip())}",
     ]
@@ -106,7 +107,8 @@ def which_question(asked: ClarifyingQuestion) -> str:
     """Return the text of the dialog to choose a behaviour, with numbered options."""
     facts = f"Suppose that {listed([*map(shortened, asked.facts)])}." if asked.facts else ""
     options = (
-        f"{number}. The robot {shortened(one.difference)}." for number, one in enumerate(asked.options, 1)
+        f"{number}. The robot {shortened(one.difference)} ({one.share})."
+        for number, one in enumerate(asked.options, 1)
     )
     last = f'The answer "none" ends the mission: {asked.why_last}.' if asked.why_last else ""
     return "\n".join(filter(None, ("Which did you mean?", facts, *options, asked.left_out, last)))

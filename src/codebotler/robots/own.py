@@ -89,11 +89,13 @@ class OwnRobot:
 
     def connect(self) -> None:
         """Call the object's `connect` if it has one, and set the clock to 0."""
+        if not self._stop_returned.is_set():
+            raise NotReadyError(f"an earlier call of {self.name}.stop has not returned; check the robot")
         if self._loop is None:
             self._loop = asyncio.new_event_loop()
             self._thread = threading.Thread(target=_run, args=(self._loop,), daemon=True)
             self._thread.start()
-        self._stopped, self._is_lost, self.failed_stop = False, False, ""
+        self._stopped, self.failed_stop = False, ""
         connect = getattr(self._body, "connect", None)
         if connect is not None:
             try:
@@ -128,7 +130,6 @@ class OwnRobot:
                 raise
             if kind in dict(row.fails):
                 raise RobotError(kind, str(error) or f"{skill}: {dict(row.fails)[kind]}") from error
-            self._is_lost = True  # an earlier `stop` may not have reached the robot
             self.cancel()
             failed = f"; {self.failed_stop}" if self.failed_stop else ""
             raise RobotLostError(f"{self.name}.{skill} failed: {_describe(error)}{failed}") from error
@@ -150,18 +151,13 @@ class OwnRobot:
         raise CancelledError
 
     def cancel(self) -> None:
-        """Call the object's `stop`, and cancel the running method if it is async.
-
-        Another press calls `stop` again if it failed before, or if the method failed or is still running.
-        """
+        """Call the object's `stop` unless a call of it is under way, and cancel an async method that runs."""
         with self._stop_lock:
             is_calling = not self._stop_returned.is_set()  # on another thread
-            is_done = self._stopped and not (self._is_busy or self._is_lost or self.failed_stop)
             self._stopped = True
-            if not (is_calling or is_done):
-                self._stop_returned.clear()
+            self._stop_returned.clear()
         self.clock.stop()
-        if is_calling or is_done:
+        if is_calling:
             self._stop_returned.wait(STOP_SECONDS)
             return
         try:

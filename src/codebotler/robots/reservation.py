@@ -73,8 +73,8 @@ class Reservation:
         except BlockingIOError:
             holder = os.pread(self._lock, 1_000, 0).decode(errors="replace")
             raise NotReadyError(
-                f"another tool ({holder or 'just started'}) is using the robot {self.robot.name}; wait until "
-                "its mission has ended, or stop it there"
+                f"another tool ({holder or 'just started'}) has a mission open with the robot "
+                f"{self.robot.name}; wait until it has ended, or stop it there"
             ) from None
         os.truncate(self._lock, 0)
         holder = f"process {os.getpid()}, since {datetime.now().astimezone():%H:%M:%S}"

@@ -188,7 +188,9 @@ class Console:
         """Read what a mission did and saw, by ID or `last`. Raise UserError if it cannot be continued."""
         return read_past(find_mission(self.home, mission), self.robot.skills, self.robot.name, self.world)
 
-    def rest_of(self, past: MissionPast, program: str = "", author: str = "") -> MissionOrder:
+    def rest_of(
+        self, past: MissionPast, program: str = "", author: str = "", *, model: str = ""
+    ) -> MissionOrder:
         """Return the order to continue a mission by `program`, its own if nothing was done, or a model's."""
         # A step-by-step mission has no program of its own: the text only describes it.
         skills = called_skills(parse_leniently(past.program), self.robot.skills)
@@ -196,7 +198,8 @@ class Console:
             program, author = past.program, past.model
             model = past.model if past.model in self.models else ""
         else:
-            model = "" if program else past.model if past.model in self.models else self.models[0]
+            known = past.model if past.model in self.models else self.models[0]
+            model = "" if program else model or known
         return MissionOrder(past.instruction, model, program, author, past=past)
 
     def _recover(self, session: MissionSession) -> None:
@@ -266,7 +269,7 @@ class Console:
             is_active = session is not None and not session.view.is_over
             if session is not None and is_active and stops:
                 session.stop_soon(by)
-            if lost is not None:
+            if lost is not None and not self._stopping.is_alive():
                 self._stopping = lost.stop_soon(by)
             if holds and stops:
                 self._hold(session)
@@ -283,7 +286,7 @@ class Console:
     def warning(self) -> str:
         """A sentence about a robot that was lost and may still move, until a person approves a mission."""
         lost = self._forget_loss()
-        return "" if lost is None else capitalize(lost.view.reason)
+        return "" if lost is None else f"The robot may still move. {capitalize(lost.view.reason)}."
 
     def _change(self) -> None:
         """Wake all viewers. Once a robot is lost, have a person approve the next mission."""

@@ -75,7 +75,8 @@ def router(console: Console, face: Face) -> APIRouter:
     @routes.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
         """Stop a mission that is approved or runs, and return whether there was one to stop."""
-        return {"stopping": console.stop(BY_FACE, only_moving=True, holds=True)}
+        stopping = console.stop(BY_FACE, only_moving=True, holds=True)
+        return {"stopping": stopping, "warning": bool(console.warning)}
 
     @routes.websocket("/api/face/live")
     async def live(socket: WebSocket) -> None:
@@ -120,7 +121,7 @@ def face_data(console: Console, face: Face) -> dict[str, Any]:
         "screens": face.screens,
         "state": view.state,
         "is_over": view.is_over,
-        "reason": UNCONFIRMED_STOP if view.reason == UNCONFIRMED_STOP else "",
+        "reason": UNCONFIRMED_STOP if console.warning else "",
     }
 
 

@@ -716,6 +716,33 @@ def test_a_robot_that_is_lost_ends_the_steps(tmp_path: Path) -> None:
         use(gatekeeper, act)
 
 
+def test_after_a_loss_the_agent_and_its_person_are_warned(tmp_path: Path) -> None:
+    robot = FakeRobot(lambda skill, _: ANSWERS.get(skill))
+    gatekeeper = Gatekeeper(Console(robot, tmp_path, open_recorded), asks_client=True)
+    answer, asked = make_person("cancel")
+
+    talk = "def task_program():\n    say('a')\n"
+
+    async def act(agent: Agent) -> None:
+        session = gatekeeper.console.begin(MissionOrder(program=talk))
+        await wait_until(gatekeeper, lambda view: view.may_be_approved)
+        robot.answer = fail_with(RobotLostError("its battery is empty"))
+        session.approve(session.view.digest)
+        await wait_until(gatekeeper, lambda view: view.is_over)
+        await asyncio.to_thread(session.join, SOON)
+        robot.answer = lambda skill, _: ANSWERS.get(skill)
+        proposed = await agent.call("propose_mission", program=talk)
+        assert any("battery" in remark for remark in proposed["remarks"])
+        await agent.call("run_mission", digest=proposed["digest"], seconds=0.05)
+        assert "battery" in asked[0].splitlines()[0]
+        assert "contract again" in asked[0]
+        stopped = await agent.call("stop")
+        assert any("battery" in remark for remark in stopped["remarks"])
+
+    with gatekeeper.console:
+        use(gatekeeper, act, answer=answer)
+
+
 def test_steps_beyond_the_contract_of_the_start_need_a_person(gatekeeper: Gatekeeper) -> None:
     gatekeeper.console.within, gatekeeper.asks_client = contract_from(allow_all("say"), SKILLS), True
     answer, asked = make_person("cancel")

@@ -186,9 +186,9 @@ def test_another_press_stops_a_robot_that_missed_the_first_one(write: Write) -> 
         robot.cancel()
         with pytest.raises(CancelledError):
             speech.result(SOON)
-    robot.cancel()  # The robot has stopped already.
+    robot.cancel()  # Only a person knows whether it has stopped, so each press is sent.
     robot.connect()
-    assert robot.perform("get_current_location", ()) == "2"
+    assert robot.perform("get_current_location", ()) == "3"
 
 
 def test_robot_whose_method_failed_is_stopped_at_each_press(write: Write) -> None:
@@ -209,6 +209,32 @@ def test_robot_whose_method_failed_is_stopped_at_each_press(write: Write) -> Non
     robot.cancel()
     robot.connect()
     assert robot.perform("get_current_location", ()) == "3"
+
+
+def test_robot_does_not_connect_while_a_stop_is_under_way(write: Write) -> None:
+    robot = write(
+        """
+    gate, called = threading.Event(), threading.Event()
+    def stop(self): self.called.set(); self.gate.wait(30)
+    def rooms(self): return ["hall"]
+    def say(self, message): self.called.wait(30)
+    def get_current_location(self): return "hall"
+"""
+    )
+    robot.connect()
+    with ThreadPoolExecutor() as threads:
+        speech = threads.submit(robot.perform, "say", ["hello"])
+        stop = threads.submit(robot.cancel)
+        time.sleep(0.05)
+        robot.disconnect()
+        with pytest.raises(NotReadyError):
+            robot.connect()
+        robot._body.gate.set()  # type: ignore[attr-defined]
+        stop.result(SOON)
+        with pytest.raises(CancelledError):
+            speech.result(SOON)
+    robot.connect()
+    assert robot.perform("get_current_location", ()) == "hall"
 
 
 STOPS_BADLY = {

@@ -796,6 +796,9 @@ def test_nothing_begins_while_a_stop_of_a_lost_robot_is_under_way(tmp_path: Path
         run_and_lose(console)
         robot.cancel = lambda: may_return.wait(30) and None  # type: ignore[assignment,method-assign]  # hangs
         console.stop("a person")
+        stopping = console._stopping
+        console.stop("a person")
+        assert console._stopping is stopping, "a second press does not hide the first one"
         with pytest.raises(MissionError):
             console.begin(MissionOrder(program=HELLO))
         may_return.set()

@@ -155,22 +155,33 @@ def test_the_face_shows_that_a_robot_does_not_confirm_its_stop(tmp_path: Path) -
     console = Console(
         Simulated(World((Room("a"),), "a")), tmp_path, lambda _: pytest.fail("no model"), face=face
     )
-    console.session = type(
-        "Ended", (), {"view": SessionView(1, "m", MissionState.FAILED, reason=UNCONFIRMED_STOP)}
-    )()
+    view = SessionView(1, "m", MissionState.FAILED, reason=UNCONFIRMED_STOP)
+    ended = type("Ended", (), {"view": view, "is_approved_by_person": True, "may_move": True})()
+    console.session = ended
+    console._change()
     assert face_data(console, face)["reason"] == UNCONFIRMED_STOP
+    console.session = type("Next", (), {"view": SessionView(2, "n"), "is_approved_by_person": False})()
+    assert face_data(console, face)["reason"] == UNCONFIRMED_STOP, "the next mission only waits"
+    console.session.is_approved_by_person = True
+    assert face_data(console, face)["reason"] == ""
 
 
 def test_a_face_stops_a_robot_that_runs_and_nothing_else(server: PageServer) -> None:
     server.run(FAR)
     wait_until(server, lambda now: now["doing"] == "moving")
-    assert server.face("POST", "/api/face/stop?only_moving=false").data == {"stopping": True}
+    assert server.face("POST", "/api/face/stop?only_moving=false").data == {
+        "stopping": True,
+        "warning": False,
+    }
     assert wait_until(server, lambda now: now["is_over"])["state"] == "stopped"
     assert "at the face" in read_missions(server.home)[-1].reason
     server.call("POST", "/api/missions", {"program": FAR})
     while server.call("GET", "/api/robot").data["state"] != "checked":
         time.sleep(0.01)
-    assert server.face("POST", "/api/face/stop?only_moving=false").data == {"stopping": False}
+    assert server.face("POST", "/api/face/stop?only_moving=false").data == {
+        "stopping": False,
+        "warning": False,
+    }
     assert server.call("GET", "/api/robot").data["state"] == "checked"
 
 

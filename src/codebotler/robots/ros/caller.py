@@ -166,8 +166,9 @@ class RosCaller:
                 self._send_lock.release()
         if worker is not None:
             self._rescue(worker)
-        elif self._in_doubt:
+        else:  # nobody asks for this unless the robot was lost, or did not confirm a stop
             with self._rescue_lock:
+                self._in_doubt = True
                 self._cancel_all()
 
     def disconnect(self) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from nicegui import ui
 
@@ -36,7 +36,7 @@ _MAX_LISTED_MOMENTS, _MAX_TITLE = 60, 160
 class RobotPane:
     """Shows the progress of the current mission."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, model: Callable[[], str]) -> None:
         self._console = console
         self._drawn: tuple[Moment, ...] = ()
         self._mapped: object = None
@@ -51,7 +51,8 @@ class RobotPane:
             self._where = PlainText("p", "", "quiet")
             self._asking = None if console.face is None else QuestionPane(console.face)
             self._reason = PlainText("p", "", "reason")
-            self._continue = ContinueButton(console)
+            self._warning = PlainText("p", "", "trouble").props("role=alert")
+            self._continue = ContinueButton(console, model=model)
             self._map = ui.html("", sanitize=False).classes("map")
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
 
@@ -69,6 +70,8 @@ class RobotPane:
             where.append(f"{progress.clock:.1f} s on the robot's clock")
         self._where.say(" · ".join(where))
         self._reason.say(reason_text(view.reason, view.line))
+        lost = "" if view.is_over and view.progress.has_begun else self._console.warning  # else its reason
+        self._warning.say(lost)
         self._continue.show(view)
         if self._asking is not None:
             self._asking.show(is_over=view.is_over)

@@ -50,7 +50,7 @@
       const { stopping, warning, detail } = await answer.json();
       if (!answer.ok) throw new Refused(detail);
       if (warning) {
-        say(UNSURE, "bad", true);
+        say(UNSURE, "bad");
       } else if (stopping) {
         say("Stop sent. Waiting for the robot to confirm …", "busy");
         await watch(which);
