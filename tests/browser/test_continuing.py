@@ -57,7 +57,7 @@ def test_continue(tmp_path: Path, open_page: OpenPage, shoot: Shoot, screen: Scr
         press(page, "Continue")
         expect(page.get_by_role("button", name="Run it on the robot")).to_be_enabled()
         expect(page.locator(".done-before li")).to_have_count(2)
-        expect(page.locator(".storyboard h3")).to_have_text("Still to do")
+        expect(page.locator(".storyboard h3")).to_have_text("What the rest would do")
         expect(page.locator(".repeated")).to_have_count(0)
         expect(page.locator(".scene .room").first).to_have_text("printer room 1")
         look(page, shoot, f"continue-{which}")

@@ -60,6 +60,11 @@ class CandidateCluster:
         """The most frequent program, which represents the cluster."""
         return self.programs[0]
 
+    @property
+    def in_vain(self) -> int:
+        """The number of worlds in which the program waits or searches without success."""
+        return sum(sample.in_vain for sample in self.samples)
+
     def extended(self, samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> CandidateCluster:
         """Return the cluster with runs of its first program in further worlds."""
         runs, all_behaviours = (*self.samples, *samples), (*self.behaviours, *behaviours)
@@ -99,6 +104,8 @@ class CandidateClusters:
         rejected += f"; {self.unwanted} would do what was not meant" if self.unwanted else ""
         if self.unwanted and len(self.clusters) == 1:
             return f"took the only behaviour that was not refused: {largest.size} of {total}{rejected}"
+        if len(self.clusters) == 1:
+            return f"all of {total} behave alike{rejected}"
         if any(other.size == largest.size for other in self.clusters[1:]):
             return f"took the first of the most frequent behaviours: {largest.size} of {total}{rejected}"
         return f"took the most frequent behaviour: {largest.size} of {total}{rejected}"
@@ -153,7 +160,7 @@ def cluster_candidates(
         more = _run_with_settled_people(worker, clusters, rooms, settings)
         clusters = [one.extended(new, describe(new)) for one, new in zip(clusters, more, strict=True)]
     unwanted_count = len(programs) - rejected - sum(one.size for one in clusters)
-    clusters.sort(key=lambda one: -one.size)
+    clusters.sort(key=lambda one: (-one.size, one.in_vain))
     return CandidateClusters(tuple(clusters), rejected, unwanted_count, people)
 
 

@@ -54,15 +54,17 @@ class CandidateOption:
 
     Args:
         program: the program that the robot would run.
-        size: the number of candidates that behave like it.
+        size: the number of candidates that behave like it, in this world at least.
         steps: its steps in the world of the question, from `steps_of`.
         difference: only how it differs from the other options, such as "ends in kitchen".
+        share: how many candidates behave like it, and in how many worlds it waits without success, in words.
     """
 
     program: str = field(repr=False)
     size: int
     steps: tuple[Mapping[str, Any], ...] = field(repr=False)
     difference: str
+    share: str = ""
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,6 @@ class ClarifyingQuestion:
         facts: the facts of the imagined world that explain the differences, in words.
         total: the number of accepted candidates.
         sample: the number of the imagined world.
-        alike: the number of other candidates that do the same as an option in this world.
         rejected: the number of candidates that the check rejected.
         why_last: why no new programs are written after the answer `none`; empty if some are.
     """
@@ -83,20 +84,14 @@ class ClarifyingQuestion:
     facts: tuple[str, ...]
     total: int
     sample: int
-    alike: int = 0
     rejected: int = 0
     why_last: str = ""
 
     @property
     def left_out(self) -> str:
         """A sentence about missing candidates: "Not shown: 2 programs that ..."; empty if none is missing."""
-        left = self.total - sum(one.size for one in self.options) - self.alike
-        parts = (
-            [f"{counted(self.alike, 'program')} that would do the same here, but not always"]
-            if self.alike
-            else []
-        )
-        parts += [f"{counted(left, 'program')} that would do something else"] if left else []
+        left = self.total - sum(one.size for one in self.options)
+        parts = [f"{counted(left, 'program')} that would do something else"] if left else []
         parts += [f"{counted(self.rejected, 'program')} that the check rejects"] if self.rejected else []
         return f"Not shown: {listed(parts)}." if parts else ""
 
@@ -163,16 +158,24 @@ def question_about(
     shown = _distinct_clusters(groups.clusters, number)
     samples = [one.samples[number] for one in shown]
     behaviours = [one.behaviours[number] for one in shown]
-    options = (
-        CandidateOption(one.program, one.size, tuple(steps_of(sample.outcome.trace, has_places=True)), words)
-        for one, sample, words in zip(shown, samples, describe_differences(samples, behaviours), strict=True)
-    )
+    options = []
+    for one, sample, words in zip(shown, samples, describe_differences(samples, behaviours), strict=True):
+        behaviour, steps = one.behaviours[number], tuple(steps_of(sample.outcome.trace, has_places=True))
+        size = sum(other.size for other in groups.clusters if other.behaviours[number] == behaviour)
+        options.append(CandidateOption(one.program, size, steps, words, _share(one, size, groups.total)))
     why_last = "this is the second question" if is_second else ""
     why_last = "a recorded model writes no new programs" if is_recorded(model) else why_last
     facts = _facts_that_matter(shown, number)
-    others = [one for one in groups.clusters if one not in shown and one.behaviours[number] in behaviours]
-    alike = sum(one.size for one in others)
-    return ClarifyingQuestion(tuple(options), facts, groups.total, number, alike, groups.rejected, why_last)
+    return ClarifyingQuestion(tuple(options), facts, groups.total, number, groups.rejected, why_last)
+
+
+def _share(shown: CandidateCluster, size: int, total: int) -> str:
+    """Say how many candidates act like a cluster, in all worlds and in this one, and whether it waits."""
+    worlds = counted(len(shown.samples), "imagined world")
+    here = f"; {counted(size - shown.size, 'other')} would do the same here, but not in other worlds"
+    waits = f"; waits or searches without success in {shown.in_vain} of {worlds}"
+    share = f"{shown.size} of {counted(total, 'program')}"
+    return f"{share}{here * (size > shown.size)}{waits * bool(shown.in_vain)}"
 
 
 def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:

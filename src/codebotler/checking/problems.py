@@ -11,13 +11,15 @@ from codebotler.checking.contracts.file import contract_data
 from codebotler.core.errors import VIOLATION
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
-from codebotler.core.text.words import brief, counted, listed
+from codebotler.core.text.words import brief, counted, elide_list, listed
 from codebotler.core.trace import Outcome, Trace, outcome_data
 from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.worlds.fact_sampler import Draw, FactSampler
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.simulator.worlds.sampled_facts import SampledFact
 from codebotler.simulator.worlds.simulated_world import ambiguous
+
+MAX_ASSUMED_FACTS = 4
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,13 @@ class CheckResult:
     def rooms_are_guessed(self) -> bool:
         """Whether the rooms were taken from the program itself."""
         return self.room_map.guessed
+
+    @property
+    def assumption(self) -> str:
+        """What the program takes for granted and all samples suppose, in a sentence; empty if nothing."""
+        facts = (one.sentence for sample in self.samples for one in sample.facts if not one.is_random)
+        found = listed(elide_list([*dict.fromkeys(facts)], MAX_ASSUMED_FACTS))
+        return f"The program takes for granted that {found}." if found else ""
 
     @property
     def evidence(self) -> frozenset[int]:

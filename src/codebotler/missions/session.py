@@ -149,6 +149,8 @@ class MissionSession(SharedView):
                 raise MissionError("this question is no longer asked")
             if isinstance(answer, int) and not 0 <= answer < len(question.options):
                 raise MissionError(f"there is no option {answer + 1}; there are {len(question.options)}")
+            if answer != "none" and more.strip():
+                raise MissionError('words can be added only to "none of these"; choose it, or leave them out')
             self.is_changed_by_person |= bool(more.strip())
             self._next_task = partial(
                 self._take_answer, question=question, answer=answer, more=" ".join(more.split())
@@ -361,7 +363,8 @@ class MissionSession(SharedView):
         option = question.chosen(answer)
         if option is not None:
             who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
-            mission.note(f"{who}{question.supposition}: a robot that {option.difference}")
+            rather = "".join(f"; not: {one.difference}" for one in question.options if one is not option)
+            mission.note(f"{who}{question.supposition}: a robot that {option.difference}{rather}")
             self._take(mission, option.program)
         elif not more or question.why_last:
             mission.fail(f"no program does what was meant{question.why_last and '; '}{question.why_last}")

@@ -25,7 +25,7 @@ def add(console: Console, frame: Frame) -> None:
         PlainText("h1", "Operate the robot", "unseen")
         with ui.element("div") as box:
             instruction = InstructionPane(console)
-            panes = (instruction, ProgramPane(console), RobotPane(console))
+            panes = (instruction, ProgramPane(console), RobotPane(console, lambda: instruction.model))
 
         def show() -> None:
             view = console.view

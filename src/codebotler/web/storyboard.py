@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from typing import Any, NamedTuple
 
 from nicegui import ui
@@ -95,11 +96,13 @@ def draw_strips(board: Storyboard) -> None:
 
 def scenes_reached(strip: Strip, visited: Sequence[str], learned: Sequence[Event]) -> int | None:
     """Return how many drives of a strip the robot has done, or None if it did or saw something else."""
-    is_whole = all(scene.room != _LEFT_OUT for scene in strip.scenes)
-    expected = [deed.text for scene in strip.scenes for deed in scene.deeds if deed.kind in {CHECK, ANSWER}]
+    known = [*takewhile(lambda scene: scene.room != _LEFT_OUT, strip.scenes)]
+    expected = [deed.text for scene in known for deed in scene.deeds if deed.kind in {CHECK, ANSWER}]
     actual = [_learned_text(event) for event in learned]
+    if len(known) < len(strip.scenes):  # what was left out may contain the rest
+        actual = actual[: len(expected)]
     # Speech recognition may change the case of an option and add spaces.
-    if is_whole and _spoken(expected[: len(actual)]) != _spoken(actual):
+    if _spoken(expected[: len(actual)]) != _spoken(actual):
         return None
     for number, room in enumerate(visited, start=1):
         scene = strip.scenes[number] if number < len(strip.scenes) else None

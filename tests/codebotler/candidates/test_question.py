@@ -72,6 +72,13 @@ def test_question_offers_at_most_the_three_largest_options() -> None:
     assert "2 programs that the check rejects" in rest.left_out
 
 
+def test_an_option_that_waits_without_success_says_so() -> None:
+    waits = cluster(2, "a", ONE, ONE)
+    waits = replace(waits, samples=(waits.samples[0], replace(waits.samples[1], in_vain=True)))
+    shares = [one.share for one in ask_about(waits, cluster(2, "b", TWO, TWO)).options]
+    assert [("1 of 2 imagined worlds" in share) for share in shares] == [True, False]
+
+
 def test_a_shorter_storyboard_is_preferred() -> None:
     look = Event("check", "mug", found=True, place="hall")
     assert ask_about(cluster(1, "a", (look, *ONE), ONE), cluster(1, "b", TWO, TWO)).sample == 1
@@ -89,7 +96,8 @@ def test_a_world_in_which_all_options_do_something_is_preferred() -> None:
 def test_options_that_are_alike_in_the_world_are_told_apart_from_others() -> None:
     three = cluster(3, "a", ONE, ONE), cluster(2, "b", TWO, TWO), cluster(1, "c", ONE, TWO)
     question = ask_about(*three)
-    assert (len(question.options), question.alike) == (2, 1)
+    assert ["1 other " in one.share for one in question.options] == [True, False]
+    assert [one.size for one in question.options] == [4, 2]
     assert "something else" not in question.left_out
 
 

@@ -257,6 +257,13 @@ def test_endless_waiting_without_a_look_runs_once(monkeypatch: pytest.MonkeyPatc
     assert "imagined worlds" not in found.problems[0].message
 
 
+def test_check_says_what_the_program_takes_for_granted() -> None:
+    program = "def task_program():\n    go_to('hall')\n    ask('ann', 'Tea?', ['yes'])\n"
+    assert '"ann" is in "hall"' in check(program, rooms=["hall"]).assumption
+    asks_if_there = program.replace("    ask", "    if is_in_room('ann'):\n        ask")
+    assert check(asks_if_there, rooms=["hall"]).assumption == ""
+
+
 def test_search_may_assume_that_the_thing_exists(checks: Checks) -> None:
     lines = (
         "for room in get_all_rooms():",

@@ -67,7 +67,7 @@ def test_a_person_chooses_and_the_mission_keeps_the_answer(
         assert view.phase == "question"
         assert view.question is not None
         assert [option.size for option in view.question.options] == [2, 1]
-        difference = view.question.chosen(answer)
+        difference, options = view.question.chosen(answer), view.question.options
         session.answer(session.view.question, answer)
         view = wait_for_person(session)
         assert (view.program, view.question, view.author) == (program, None, "several")
@@ -75,6 +75,7 @@ def test_a_person_chooses_and_the_mission_keeps_the_answer(
         assert difference is not None
         (note,) = [note for note in notes(tmp_path, view) if difference.difference in note]
         assert ("left the choice" in note) == (answer == "decide")
+        assert all(option.difference in note for option in options), "the record names the others, too"
 
 
 def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_path: Path) -> None:
@@ -140,6 +141,8 @@ def test_wrong_answers_are_refused(tmp_path: Path) -> None:
             session.answer(session.view.question, 2)
         with pytest.raises(MissionError):
             session.answer(session.view.question, -1)
+        with pytest.raises(MissionError, match="none of these"):
+            session.answer(session.view.question, 0, "but be quick")
         asked = session.view.question
         session.answer(asked, 0)
         with pytest.raises(MissionError):

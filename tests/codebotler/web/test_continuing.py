@@ -102,6 +102,14 @@ def fetch(console: Console) -> SessionView:
     return view
 
 
+def test_a_chosen_model_writes_the_rest(tmp_path: Path) -> None:
+    with make_console(tmp_path, Author(FETCH)) as console:
+        fetch(console)
+        past = console.past_of("last")
+        assert console.rest_of(past).model == "author"
+        assert console.rest_of(past, model="other").model == "other"
+
+
 def test_the_model_of_the_program_writes_the_rest_and_a_person_approves_it(tmp_path: Path) -> None:
     author = Author(FETCH, GO_BACK)
     with make_console(tmp_path, author) as console:
@@ -115,7 +123,7 @@ def test_the_model_of_the_program_writes_the_rest_and_a_person_approves_it(tmp_p
         assert (past.mission, view.progress.room) == (before.id, "kitchen")
         assert "went to" in str(author.asked[-1].messages)
         assert (storyboard_title(view), storyboard_title(before)) == (
-            "Still to do",
+            "What the rest would do",
             "What the check expected",
         )
         assert (origin_text(before), before.id in origin_text(view)) == ("", True)

@@ -92,9 +92,10 @@ def test_progress_lists_visited_rooms_finds_and_the_held_thing() -> None:
     now = after(*events)
     assert now.visited == ("Kitchen",)
     assert now.trail == ((1.0, 2.0), (3.0, 2.0))
-    assert now.finds == (Find("Kitchen", "mug"), Find("Kitchen", "ann"))
-    assert now.held == "mug"
-    assert after(*events, call("place", obj="mug"), done("place")).held == ""
+    assert (after(*events[:-2]).finds) == (Find("Kitchen", "mug"), Find("Kitchen", "ann"))
+    assert (now.finds, now.held) == ((Find("Kitchen", "ann"),), "mug")
+    put_down = after(*events, call("place", obj="mug"), done("place"))
+    assert (put_down.finds, put_down.held) == ((Find("Kitchen", "ann"), Find("Kitchen", "mug")), "")
     failed = line("error", number=1, skill="go_to", kind="E", message="m")
     assert after(call("go_to", location="attic"), failed).visited == ()
 
@@ -295,6 +296,14 @@ def test_a_find_rules_out_strips_without_it() -> None:
         possible = [one for one in shown if scenes_reached(one, ("kitchen",), looked)]
         said[found] = [one.scenes[-1].deeds[-1].text for one in possible]
     assert said == {True: ["yes"], False: ["no"]}
+
+
+def test_a_look_rules_out_a_strip_whose_rest_is_left_out() -> None:
+    program = "import time\n\ndef task_program():\n    while not is_in_room('mug'):\n        time.sleep(1)\n"
+    shown = [one for one in strips(check(program, rooms=["hall"])) if one.scenes[-1].room == _LEFT_OUT]
+    shown += [Strip("", (Scene("hall", (Action("check", "finds"),)), Scene(_LEFT_OUT)), "", ends_well=True)]
+    looks = after(*(call("is_in_room", entity="mug"), done("is_in_room", result=False)) * 40).learned
+    assert [scenes_reached(one, (), looks) for one in shown] == [0, None]
 
 
 def test_an_answer_rules_out_strips_with_another() -> None:

@@ -49,6 +49,7 @@ def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool =
     for problem in found.problems:
         parts += [Text(), *_problem(problem, lines)]
     parts += [Text(), _rooms(found), *_vain_searches(found)]
+    parts += [Text(found.assumption, "dim")] if found.assumption else []
     parts += [Text(f'the rule "{one.rule}" {one.words}', PROOF_STYLES[one.verdict]) for one in found.proofs]
     kinds = _distinct_samples(found)
     for sample in kinds if shows_all else kinds[:1]:

@@ -17,7 +17,7 @@ from codebotler.checking.sampled import CheckSettings
 from codebotler.checking.storyboard import storyboard
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import busy, console, note, print_source, shortened, visible
-from codebotler.core.text.words import brief, counted, listed, with_sentence
+from codebotler.core.text.words import brief, listed, with_sentence
 from codebotler.generation.generate import Attempt, gather_candidates, write_checked_program
 from codebotler.generation.no_program import ProgramlessReply
 from codebotler.models.base import Model
@@ -162,8 +162,7 @@ def question_view(question: ClarifyingQuestion) -> RenderableType:
     parts: list[RenderableType] = [Text("Which did you mean?", "bold"), *([Text(facts)] if facts else [])]
     for number, option in enumerate(question.options, 1):
         head = f"{number}: {visible(option.difference)}"
-        like = f"{option.size} of {counted(question.total, 'program')}"
-        parts += [Text(), Text.assemble((head, "bold"), (f"  ({like})", "dim"))]
+        parts += [Text(), Text.assemble((head, "bold"), (f"  ({option.share})", "dim"))]
         parts.append(Padding(storyboard(option.steps, set()), (0, 0, 0, 2)))
     if question.left_out:
         parts += [Text(), Text(question.left_out, "dim")]
@@ -178,7 +177,7 @@ def ask_which(question: ClarifyingQuestion, read_line: Callable[[str], str]) -> 
     while True:
         line = read_line(f'Answer {numbers}, "none" or "you decide": ')
         if not line:
-            raise UserError("no answer; `you decide` takes the most frequent behaviour")
+            raise UserError("no answer; `you decide` takes the first one")
         try:
             return question.parse(line)
         except UserError as error:

@@ -58,7 +58,7 @@ class Progress:
     visited: tuple[str, ...] = ()  # the destinations of completed drives, as named in the program
     learned: tuple[Event, ...] = ()  # looks and questions, with what came of them
     trail: tuple[Point, ...] = ()  # the latest positions, in metres
-    finds: tuple[Find, ...] = ()  # objects seen and people asked, each listed once
+    finds: tuple[Find, ...] = ()  # objects seen or put down, and people asked, each listed once
     held: str = ""  # the object in the robot's hand
     moments: tuple[Moment, ...] = ()  # the latest entries of the activity list
 
@@ -120,9 +120,10 @@ class Progress:
                 visited = (*self.visited, self.subject)[:_MAX_STEPS]
                 now = replace(self, visited=visited, is_between=False)
             case kinds.PICK:
-                now = replace(self, held=self.subject)
+                left = tuple(one for one in self.finds if one != Find(self.room, self.subject))
+                now = replace(self, held=self.subject, finds=left)
             case kinds.PLACE:
-                now = replace(self, held="")
+                now = replace(self._with_find(Find(self.room, self.subject)), held="")
             case kinds.CHECK:
                 now = self._with_find(Find(self.room, self.subject)) if result is True else self
                 look = Event(kinds.CHECK, self.subject, found=result is True)

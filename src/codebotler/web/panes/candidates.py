@@ -8,7 +8,7 @@ from nicegui import ui
 
 from codebotler.candidates.question import CandidateOption, ClarifyingAnswer, ClarifyingQuestion
 from codebotler.core.terminal import shortened
-from codebotler.core.text.words import counted, listed
+from codebotler.core.text.words import listed
 from codebotler.missions.display.view import SessionView
 from codebotler.missions.display.wording import capitalize
 from codebotler.web.console import Console
@@ -37,7 +37,7 @@ class CandidatesPane:
         with ui.element("div").classes("cards"):
             for number, option in enumerate(question.options):
                 with ui.element("article").classes("card"):
-                    self._draw_option(question, option, number)
+                    self._draw_option(option, number)
         PlainText("p", question.left_out, "quiet")
         more = None
         if question.why_last:
@@ -48,9 +48,9 @@ class CandidatesPane:
             Button("None of these", lambda: self._reject(more), "plain")
             Button("You decide (the first one)", lambda: self._answer("decide"), "plain")
 
-    def _draw_option(self, question: ClarifyingQuestion, option: CandidateOption, number: int) -> None:
+    def _draw_option(self, option: CandidateOption, number: int) -> None:
         PlainText("p", f"{number + 1}. {shortened(option.difference, _MAX_DIFFERENCE)}", "difference")
-        PlainText("small", f"{option.size} of {counted(question.total, 'program')}", "quiet")
+        PlainText("small", option.share, "quiet")
         if option.steps:
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
                 for scene in scenes(option.steps, option.steps[0]["place"]):

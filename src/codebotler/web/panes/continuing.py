@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from nicegui import html, ui
@@ -26,18 +26,21 @@ EARLY_ENDS = frozenset({MissionState.FAILED, MissionState.STOPPED, MissionState.
 
 
 class ContinueButton(Button):
-    """A button to continue a mission that ended early. It first asks about a step that may have happened."""
+    """A button to continue a mission that ended early. It first asks about a step that may have happened.
 
-    def __init__(self, console: Console, mission: str = "") -> None:
+    `model` returns the name of the model that writes the rest, or "" for the one of the mission.
+    """
+
+    def __init__(self, console: Console, mission: str = "", model: Callable[[], str] = str) -> None:
         super().__init__("Continue", self._continue, "primary")
-        self._console, self._mission = console, mission
+        self._console, self._mission, self._model = console, mission, model
 
     def show(self, view: SessionView) -> None:
         """Show the button if this mission, or else an unfinished one before it, can be continued."""
         is_other = not (has_rest(view) or view.progress.has_begun or view.past)
         aside = self._console.unfinished if is_other else ""
         self._mission = aside or view.id or ("" if view.past is None else view.past.mission)
-        own = "Continue" if view.progress.has_begun or view.past is None else "Begin another rest"
+        own = "Continue" if view.progress.has_begun or view.past is None else "Ask for the rest again"
         self.text = f"Continue mission {aside} instead" if aside else own
         self.set_visibility(has_rest(view) or bool(aside))
 
@@ -45,12 +48,45 @@ class ContinueButton(Button):
         console = self._console
         past = await asyncio.to_thread(console.past_of, self._mission)
         if past.unsure is None:
-            _begin(console, past)
+            self._begin(past)
             return
         evidence = await asyncio.to_thread(ask_evidence, console.robot, console.home, past, note)
         if not self.is_deleted:
             with self:
-                _ask(console, past, evidence)
+                self._ask(past, evidence)
+
+    def _ask(self, past: MissionPast, evidence: list[str]) -> None:
+        """Ask a person whether the unsure step happened, beside what the log and the robot say."""
+        before = self._console.session
+
+        def answer(*, happened: bool, answer: str = "") -> None:
+            dialog.close()
+            if self._console.session is not before:
+                raise MissionError("another mission has begun meanwhile")
+            self._begin(past.resolve(happened=happened, answer=answer))
+
+        with ui.dialog() as dialog, ui.card().classes("pane"):
+            PlainText("h3", "Did this happen?")
+            PlainText("p", f"{capitalize(past.question)}.")
+            for sentence in evidence:
+                PlainText("p", sentence, "quiet")
+            with ui.element("div").classes("word"):
+                for one in past.answers[:_MAX_ANSWERS]:
+                    words = f'It happened: "{shortened(one, _MAX_STEP_CHARACTERS)}"'
+                    Button(words, partial(answer, happened=True, answer=one), "plain")
+                plainly = "It happened; nobody knows the answer" if past.answers else "It happened"
+                Button(plainly, partial(answer, happened=True), "plain")
+                Button("It did not happen", partial(answer, happened=False), "plain")
+                Button("Cancel", dialog.close, "plain")
+        dialog.props('aria-label="Did this happen?"').on("hide", dialog.delete)
+        dialog.open()
+
+    def _begin(self, past: MissionPast) -> None:
+        self._console.begin(self._console.rest_of(past, model=self._model()))
+        if ui.context.client.page.path == "/":
+            scroll_up()
+        else:
+            ui.navigate.to("/")  # NiceGUI adds the prefix of the page
 
 
 def has_rest(view: SessionView) -> bool:
@@ -68,41 +104,6 @@ def is_unfinished(view: SessionView) -> bool:
 def can_be_continued(summary: MissionSummary) -> bool:
     """Return whether a mission has run on the robot, or was to continue a mission that had."""
     return bool(summary.if_tool_dies or summary.continues)
-
-
-def _ask(console: Console, past: MissionPast, evidence: list[str]) -> None:
-    """Ask a person whether the unsure step happened, beside what the log and the robot say."""
-    before = console.session
-
-    def answer(*, happened: bool, answer: str = "") -> None:
-        dialog.close()
-        if console.session is not before:
-            raise MissionError("another mission has begun meanwhile")
-        _begin(console, past.resolve(happened=happened, answer=answer))
-
-    with ui.dialog() as dialog, ui.card().classes("pane"):
-        PlainText("h3", "Did this happen?")
-        PlainText("p", f"{capitalize(past.question)}.")
-        for sentence in evidence:
-            PlainText("p", sentence, "quiet")
-        with ui.element("div").classes("word"):
-            for one in past.answers[:_MAX_ANSWERS]:
-                words = f'It happened: "{shortened(one, _MAX_STEP_CHARACTERS)}"'
-                Button(words, partial(answer, happened=True, answer=one), "plain")
-            plainly = "It happened; nobody knows the answer" if past.answers else "It happened"
-            Button(plainly, partial(answer, happened=True), "plain")
-            Button("It did not happen", partial(answer, happened=False), "plain")
-            Button("Cancel", dialog.close, "plain")
-    dialog.props('aria-label="Did this happen?"').on("hide", dialog.delete)
-    dialog.open()
-
-
-def _begin(console: Console, past: MissionPast) -> None:
-    console.begin(console.rest_of(past))
-    if ui.context.client.page.path == "/":
-        scroll_up()
-    else:
-        ui.navigate.to("/")  # NiceGUI adds the prefix of the page
 
 
 def draw_past(past: MissionPast) -> None:
@@ -137,7 +138,7 @@ def origin_text(view: SessionView) -> str:
 
 
 def storyboard_title(view: SessionView) -> str:
-    """Return the title of the storyboard, such as `Still to do` for the rest of a mission."""
+    """Return the title of the storyboard, such as `What the rest would do`."""
     if view.is_over:
         return "What the check expected"
-    return "What the robot would do" if view.past is None else "Still to do"
+    return "What the robot would do" if view.past is None else "What the rest would do"

@@ -54,11 +54,16 @@ class InstructionPane:
             self._about = PlainText("p", f"{_ABOUT_RECORDED}.", "quiet")
             self._write = Button("Write the program", self._ask, "primary")
             self._error = PlainText("p", "", "trouble").props("role=alert")
-            self._similar = DrawnBox("picks", partial(self._draw_picks, "Similar instructions"))
+            self._similar = DrawnBox("picks", partial(self._draw_picks, "Instructions it knows"))
             self._examples = DrawnBox("picks", partial(self._draw_picks, "Examples"))
             self._recent = DrawnBox("picks", partial(self._draw_picks, "Recent"))
         self._about_model()
         self._error.say("")
+
+    @property
+    def model(self) -> str:
+        """The name of the chosen model."""
+        return str(self._model.value or "")
 
     async def load(self) -> None:
         """Add the examples and the recent instructions."""
@@ -88,6 +93,8 @@ class InstructionPane:
             if (self._text.value or "").strip() in {"", self._asked}:  # keep text that is being typed
                 self._text.value = visible_lines(view.instruction)
             self._asked = visible_lines(view.instruction)
+            if view.model in self._console.models:
+                self._model.value = view.model
         self._write.allow(not view.is_written and not view.is_running)
         self._write.say("Writing …" if view.is_written else "Write the program")
         self._error.say(view.error if view.suggestions is None else self._unknown(view.suggestions))
@@ -95,11 +102,11 @@ class InstructionPane:
 
     def _ask(self) -> None:
         with warned():
-            self._console.begin(MissionOrder(self._text.value or "", self._model.value or ""))
+            self._console.begin(MissionOrder(self._text.value or "", self.model))
             scroll_up()
 
     def _about_model(self) -> None:
-        self._about.set_visibility(is_recorded(str(self._model.value)))
+        self._about.set_visibility(is_recorded(self.model))
 
     def _unknown(self, known: tuple[str, ...]) -> str:
         choose = "Choose one below. " if known else ""

@@ -159,7 +159,7 @@ class ProgramPane:
         verdict = f"{many}. The robot should not run this." if count else "Checked: no problems."
         if view.check.rooms_are_guessed:
             verdict += " The robot does not list its rooms; the check used the rooms named in the program."
-        self._verdict.say(verdict)
+        self._verdict.say(f"{verdict} {view.check.assumption}".rstrip())
 
     def _show_approval(self, view: SessionView) -> None:
         open_ = view.state is not None and view.state.is_open and not view.is_over and bool(view.program)
