@@ -25,7 +25,7 @@ def run(
     skills: SkillTable = SKILLS,
     require_isolation: bool = False,
 ) -> Iterator[Outcome]:
-    """Run pairs of a program and a world lazily, and yield the outcomes in the same order."""
+    """Run pairs of a program and a world, and yield outcomes in order. `workers` is the cores by default."""
     with WorkerPool(workers or cores(), require_isolation=require_isolation) as pool:
 
         def run_pairs(pairs: Sequence[tuple[str, World]]) -> list[Outcome]:

@@ -14,7 +14,7 @@ from codebotler.simulator.worlds.matching import Matching, finds
 
 @dataclass(frozen=True)
 class Limits:
-    """The resources that one run may use. Beyond any limit, it ends with status `timeout`."""
+    """The resources that one run may use. A run that exceeds one of them ends with status `timeout`."""
 
     seconds: float = 3600.0  # simulated seconds
     calls: int = 1_000  # skill calls; sleeping does not count
@@ -54,9 +54,9 @@ def choose(
 ) -> int | None:
     """Return the position of the option that an answer refers to, or None if there is none.
 
-    First, look for the answer in the options. If no option has it, look for yes or no in the settings' other
-    words. Any other answer means yes if it matches the question, and no otherwise. A number selects the
-    nearest option, counted from 1, or from the end if it is negative.
+    A text selects the first option that contains it. Yes and no can also be found by the settings' other
+    words. Any other text means yes if the question contains it, else no. A number counts options from 1, or
+    from the end if it is negative; if it is too large, it selects the nearest option.
     """
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1

@@ -110,7 +110,7 @@ class TranscribedRun(ProgramRun):
         self.provided.update(time=sys.modules["time"], __builtins__=self.builtins)
 
     def transcript(self, code: CodeType, kind: str, arguments: tuple[Any, ...]) -> bytes:
-        """Run a program on a new robot, and return the transcript."""
+        """Run a program on a new robot `ROBOTS[kind](*arguments)`, and return its transcript as JSON."""
         self._reset(ROBOTS[kind](*arguments))
         sys.setrecursionlimit(BATCH_RECURSION_LIMIT)
         end = self.execute(code, run_parameters(self.ledger.robot))
@@ -159,12 +159,12 @@ class TranscribedRun(ProgramRun):
             raise LimitReachedError
 
     def request(self, request: str) -> NoReturn:  # noqa: ARG002 - as in ProgramRun
-        """End the run because its time is up."""
+        """End the run. The only request of a tame program says that its simulated time is up."""
         self._let_time_pass()
         raise LimitReachedError
 
     def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
-        """Return a function for each `except` that notices a caught RecursionError or MemoryError."""
+        """Return the function for each `except`, which marks runs that catch a recursion or memory error."""
 
         def caught() -> None:
             error = sys.exc_info()[0]
@@ -175,7 +175,7 @@ class TranscribedRun(ProgramRun):
         return caught
 
     def ended_by(self, error: BaseException) -> str:
-        """Describe the error that ended the program. A recursion or memory error makes the run undecided."""
+        """Return the program's end as JSON. After a recursion or memory error, the run must be repeated."""
         try:
             str(error)
         except (RecursionError, MemoryError):

@@ -19,7 +19,7 @@ from codebotler.simulator.skill_protocol import SkillDescriptions, describe_skil
 from codebotler.simulator.worlds.robot import Argument, Setup, SimulatedRobot
 
 Programs: TypeAlias = Sequence[tuple[bytes, Sequence[SimulatedRobot]]]
-"""Each program's code, with one robot for each run."""
+"""Each program's code, with one robot for each run. All robots have the same skills."""
 
 
 class Call(NamedTuple):
@@ -50,7 +50,7 @@ TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 def message(
     programs: Programs,
 ) -> tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
-    """Return the message that sends programs to a child. All their robots must have the same skills."""
+    """Return the message for a child: skills, own skills, pickled robots, each program's robot numbers."""
     robot = programs[0][1][0]
     setups: dict[tuple[int, ...], Setup] = {}
     keyed = []
@@ -109,14 +109,14 @@ def _frame(child: IsolatedProcess) -> bytes:
 
 
 def key_of(frame: bytes, robot: SimulatedRobot) -> ReplayKey | None:
-    """Return the cache key of a transcript, or None if it is too long or its robot is not a plain copy."""
+    """Return the cache key of a robot's transcript, or None if its replay must not be cached."""
     if len(frame) > MAX_REPLAY_BYTES or robot.setup[0] != "simulated" or robot.own_skills or robot.guard:
         return None
     return frame, id(robot.skills), *map(id, robot.setup[1])
 
 
 def parse_transcript(frame: bytes) -> Transcript | None:
-    """Parse a transcript, or return None if the run must be repeated in its own process."""
+    """Parse a transcript, or return None if the child asks to repeat the run in its own process."""
     try:
         return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # the decoder returns this type
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
@@ -131,7 +131,7 @@ class Replay:
         self._own = robot.own_skills
 
     def follow(self, transcript: Transcript) -> SkillAnswer:
-        """Repeat all calls, and return the last answer. Raise ProtocolError if any answer differs."""
+        """Repeat all calls, and return the robot's last answer. Raise ProtocolError if any answer differs."""
         calls = [self._expected(call) for call in transcript.calls]
         if transcript.end is None and (not calls or calls[-1][-1] is not None):
             raise ProtocolError("the child is waiting, but has asked for nothing")

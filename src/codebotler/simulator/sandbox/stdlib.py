@@ -123,7 +123,7 @@ class Select:
     def __call__(
         self, read: list[object], write: list[object], other: list[object], timeout: float | None = None, /
     ) -> tuple[list[object], list[object], list[object]]:
-        """Wait for some seconds, or end the run if there is no timeout."""
+        """Let `timeout` simulated seconds pass, or end the run if there is no timeout."""
         if read or write or other:
             raise PermissionError(1, "Operation not permitted")
         if timeout is None:

@@ -67,7 +67,7 @@ OWN_SCOPES = (ast.FunctionDef, ast.Lambda, ast.ListComp, ast.DictComp, ast.Gener
 
 
 class WildError(Exception):
-    """Part of a program is not on the allowlist."""
+    """A part of a program is not on the allowlist, so the program is wild."""
 
 
 def wild(*_: object) -> NoReturn:
@@ -97,7 +97,7 @@ def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
 
 
 class ProgramVerifier:
-    """Raises WildError for a part that is not allowed. `ALLOWED` has a check for each kind of node."""
+    """Checks the parts of a program, and raises WildError for a part that is not in `ALLOWED`."""
 
     def __init__(self, nodes: Nodes, skills: frozenset[str]) -> None:
         self.skills = skills
@@ -116,7 +116,7 @@ class ProgramVerifier:
             wild()
 
     def is_data(self, name: str) -> bool:
-        """Return whether a name is bound to data here, or not bound at all."""
+        """Return whether a name refers to data in the current function, or to nothing."""
         if name in self.functions:
             return False
         if name not in self.special:
