@@ -32,7 +32,7 @@ ENCODINGS: Mapping[str, tuple[str, str]] = {
 
 
 def image_of(data: bytes, name: str = "the picture") -> Image.Image:
-    """Decode a JPEG, PNG or WebP file to an upright RGB image. Errors (UserError) call the image `name`."""
+    """Decode a JPEG, PNG or WebP file to an upright RGB image. If that fails, raise UserError for `name`."""
     if not data:
         raise UserError(f"{name} is empty; use a JPEG, PNG or WebP image")
     if len(data) > MAX_IMAGE_BYTES:
@@ -59,7 +59,7 @@ def read_image(path: Path) -> Image.Image:
 def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> Image.Image:
     """Decode a ROS message: a sensor_msgs/CompressedImage, or a sensor_msgs/Image in one of `ENCODINGS`.
 
-    The message is a dict whose `data` is in base64. Errors (UserError) call the image `name`.
+    The message is a dict with `data` in base64. If there is no usable image, raise UserError for `name`.
     """
     try:
         data = base64.b64decode(message["data"], validate=True)  # type: ignore[arg-type]  # a text, or an error

@@ -24,7 +24,7 @@ class ZeroShotDetector:
     def __init__(self, path: str, *, least_score: float) -> None:
         self.name = f"hf:{path}"
         if not 0 < least_score <= 1:
-            raise UserError(f"the minimum score {least_score:g} is invalid; use one above 0 and at most 1")
+            raise UserError(f"the least score {least_score:g} is invalid; use one above 0 and at most 1")
         self._least = least_score
         source = find_source(path)
         transformers.utils.logging.disable_progress_bar()

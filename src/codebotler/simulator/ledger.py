@@ -33,7 +33,7 @@ class SkillPerformer(Protocol):
 
     @property
     def now(self) -> float:
-        """The program's clock, in seconds since the start."""
+        """The time on the program's clock, in seconds since the start of the run."""
 
     @property
     def trace(self) -> Trace:
@@ -147,7 +147,7 @@ def too_long(limits: Limits) -> str:
 
 
 class RememberingLedger(Ledger):
-    """The ledger of a simulated run, which caches the answers to calls that change nothing.
+    """Counts the calls of a simulated run, and caches the answers to calls that change nothing.
 
     Caching helps programs that look a thousand times while they wait for something. It starts late, because
     most programs make too few calls for it to pay off.

@@ -108,7 +108,7 @@ class WorkerPool:
     def submit(
         self, function: Callable[_Arguments, _Value], *args: _Arguments.args, **kwargs: _Arguments.kwargs
     ) -> Future[_Value]:
-        """Call a function in a pool thread, where `here` returns the thread's worker."""
+        """Call a function in a pool thread, where `here` returns a worker. Return a Future of the result."""
         return self._threads.submit(function, *args, **kwargs)
 
     @property

@@ -70,7 +70,7 @@ class SkillProtocol:
         return self.ledger.outcome_at_end(final or {})
 
     def talk(self) -> dict[str, object] | None:
-        """Answer requests, and return the child's last message about its end, or None if there is none."""
+        """Answer requests, and return the child's last message, about its end, or None if there is none."""
         if self.child.receive() is None:
             raise LostProcessError("the process of a run ended before it was isolated")
         overrun = 0
@@ -83,7 +83,7 @@ class SkillProtocol:
                 case [str() as name, list() as values, int() | float() as now, int() as line]:
                     pass  # from a live program; only for display, since it may be false
                 case _:
-                    raise ProtocolError("a request is malformed")
+                    raise ProtocolError("a request is not valid")
             if self.robot.is_live:
                 self.robot.line = line if type(line) is int and 0 < line <= MAX_LINE else None
             self.child.send((*self._answer(name, values, now), self.robot.now))
@@ -111,12 +111,12 @@ class SkillProtocol:
             case "too-long", _:
                 self.ledger.limit = too_long(self.limits)
             case _:
-                raise ProtocolError("there is no skill with this name")
+                raise ProtocolError("a request names an unknown skill")
         return STOP
 
 
 def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
-    """Return the name and the parameters of each of a robot's skills, in the form that a child needs."""
+    """Return the name and the parameters of each of a robot's skills, as a program's process needs them."""
     return tuple(
         (skill.name, tuple((p.name, p.kind, p.type.choices, p.words) for p in skill.parameters))
         for skill in robot.skills.rows
@@ -143,7 +143,7 @@ def _option(value: object) -> Option:
         case [str(text), bool(is_text)]:
             return Option(text, is_text)
         case _:
-            raise ProtocolError("an option is malformed")
+            raise ProtocolError("an option is not valid")
 
 
 def named_arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]:
@@ -161,7 +161,7 @@ def named_arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]
 
 
 def named_result(skill: Skill, arguments: Sequence[Argument], result: Result) -> Result:
-    """Return an agent's form of a result: for a question, the chosen option's text and not its position."""
+    """Return a result as agents see it: for a question, the text of the chosen option, not its position."""
     asked = zip(skill.parameters, arguments, strict=True)
     options = next((one for parameter, one in asked if parameter.is_options), None)
     chosen = options[result] if isinstance(options, tuple) and isinstance(result, int) else result

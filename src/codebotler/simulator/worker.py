@@ -31,7 +31,7 @@ class Worker:
 
     Nearly all programs are tame: they leave nothing behind, so many of them share a process that has copies
     of their robots. All other runs, and those that such a process cannot finish, get their own process, and
-    the engine performs their skills. The fork server for these has the standard library.
+    the engine performs their skills. Only these can import modules of the standard library.
 
     Args:
         one_process_per_run: whether each run gets its own process, even if its program is tame.
@@ -88,7 +88,7 @@ class Worker:
         return isinstance(_compile(source, robot), CompiledProgram)
 
     def stop(self) -> None:
-        """Kill all processes and the current run, for good. Any thread may call this."""
+        """Kill all processes and the current run. Any thread may call this. Use the worker no more."""
         self._stopped = True
         for fork_server in list(self._fork_servers.values()):
             fork_server.kill()
@@ -102,7 +102,7 @@ class Worker:
     # --- several tame programs in one child
 
     def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
-        """Run the tame programs. Return outcomes by the positions of job and robot, where there is one."""
+        """Run the tame programs. Return outcomes by (job, robot) positions, without undecided ones."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
             return known
@@ -158,7 +158,7 @@ class Worker:
 
     @contextmanager
     def one_child(self) -> Iterator[None]:
-        """Run all batches in this context in the same child. They must belong to one program."""
+        """Run all batches in this context in the same process. They must belong to one program."""
         self._keeps_child = True
         try:
             yield

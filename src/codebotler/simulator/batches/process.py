@@ -1,7 +1,7 @@
-"""Runs tame programs in a closed child, each in all its worlds, and sends a transcript of each run.
+"""Runs tame programs in a child process, each in all its worlds, and sends a transcript of each run.
 
-The child has its own copy of each robot and ledger, so programs never wait for the engine. The engine does
-not trust the transcripts: it replays each one on its own robot, which must give the same answers.
+`sandbox.tame` explains tame programs. The child has its own copy of each robot and ledger, so programs never
+wait for the engine. The engine replays each transcript on its own robot, which must give the same answers.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def transcripts(
     batch: Batch,
     send: Callable[[list[bytes]], None] = len,  # type: ignore[assignment]  # a rehearsal sends nothing
 ) -> None:
-    """Run each program of a batch in all its worlds, and send the transcripts of each program."""
+    """Run each program of a batch in all its worlds, and pass the transcripts of each program to `send`."""
     skills, elsewhere, pickled, programs = batch
     if skills != run.skills:
         run.provide(skills)
@@ -92,7 +92,7 @@ def transcripts(
 
 
 class TranscribedRun(ProgramRun):
-    """Runs tame programs one after another, and records the skill calls of each."""
+    """Runs programs of a batch one after another in one process, and records the skill calls of each."""
 
     recursion_limit = BATCH_RECURSION_LIMIT
 
@@ -104,7 +104,7 @@ class TranscribedRun(ProgramRun):
         self.builtins = {**given, **self.counters(), "__import__": lambda *_: sys.modules["time"]}
 
     def provide(self, skills: SkillDescriptions) -> None:
-        """Provide programs with the skills, `time` and the builtins for tame programs."""
+        """Provide the names that programs have without an import: the skills, `time` and some builtins."""
         self.skills = skills
         self.provided = {name: self.skill(name, parameters) for name, parameters in skills}
         self.provided.update(time=sys.modules["time"], __builtins__=self.builtins)
@@ -128,7 +128,7 @@ class TranscribedRun(ProgramRun):
         self.refuel()
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Execute a skill on this process's copy of the robot."""
+        """Execute a skill on this process's copy of the robot (or ask the engine). Return its result."""
         given = [
             _robot_argument(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)
         ]
@@ -164,7 +164,7 @@ class TranscribedRun(ProgramRun):
         raise LimitReachedError
 
     def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
-        """Return the function for each `except`, which marks runs that catch a recursion or memory error."""
+        """Return a function for each `except`: it marks runs that catch a recursion or memory error."""
 
         def caught() -> None:
             error = sys.exc_info()[0]

@@ -90,7 +90,7 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
         if transcript.end is not None:
             outcome = judge_end(replay.ledger.outcome_at_end(transcript.end), robot)
             if outcome.status is Status.KILLED:
-                raise ProtocolError("the end of a run is malformed")
+                raise ProtocolError("the end of a transcript is not valid")
             if key is not None:
                 if len(REPLAYED) >= MAX_REPLAYS:
                     REPLAYED.clear()
@@ -104,7 +104,7 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
 def _frame(child: IsolatedProcess) -> bytes:
     frame = child.receive_bytes(MAX_FRAME)
     if frame is None:
-        raise LostProcessError("a child ended during a batch")
+        raise LostProcessError("the process of a batch ended too early")
     return frame
 
 
@@ -120,7 +120,7 @@ def parse_transcript(frame: bytes) -> Transcript | None:
     try:
         return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # the decoder returns this type
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        raise ProtocolError("a transcript is malformed") from None
+        raise ProtocolError("a transcript is not valid") from None
 
 
 class Replay:
@@ -134,28 +134,28 @@ class Replay:
         """Repeat all calls, and return the robot's last answer. Raise ProtocolError if any answer differs."""
         calls = [self._expected(call) for call in transcript.calls]
         if transcript.end is None and (not calls or calls[-1][-1] is not None):
-            raise ProtocolError("the child is waiting, but has asked for nothing")
+            raise ProtocolError("the child is waiting for an answer, but has asked for nothing")
         ledger = self.ledger
         answer: SkillAnswer = ("ok", None)
         for skill, arguments, now, expected in calls:
             if now != self.robot.now:
                 self._let_time_pass(now)
             if ledger.limit is not None:
-                raise ProtocolError("the program continues beyond a limit")
+                raise ProtocolError("a transcript continues after a limit was reached")
             answer = ledger.perform(skill, arguments)
             if ledger.broken is not None:
                 return answer
             if expected is not None and expected != (
                 answer if answer[0] != "error" else ("error", answer[1][1:])
             ):
-                raise ProtocolError("the robot gives a different answer")
+                raise ProtocolError("a transcript and the robot give different answers")
         if transcript.end is not None:
             self._let_time_pass(transcript.now)
         return answer
 
     def _let_time_pass(self, now: float) -> None:
         if now < self.robot.now:
-            raise ProtocolError("time runs backwards")
+            raise ProtocolError("a transcript reports an earlier time than before")
         if self.ledger.limit is None:
             self.ledger.let_time_pass(now)
 
@@ -164,9 +164,9 @@ class Replay:
         skill = self.robot.skills.get(call.skill)
         known = () if skill is None else skill.parameters
         if skill is None or len(known) != len(call.arguments) or not all(map(_fits, known, call.arguments)):
-            raise ProtocolError("there is no skill with this name and these parameters")
+            raise ProtocolError("a transcript calls an unknown skill, or one with wrong arguments")
         if call.kind == "ask" and call.skill not in self._own:
-            raise ProtocolError("the child could have answered this call itself")
+            raise ProtocolError("the child has asked for a skill that it can perform itself")
         value = tuple(call.value) if call.kind == "error" and isinstance(call.value, list) else call.value
         arguments: Any = call.arguments  # checked above
         return call.skill, arguments, call.now, None if call.kind == "ask" else (call.kind, value)

@@ -102,7 +102,7 @@ class RuleViolationError(RobotError):
 
     @property
     def is_late(self) -> bool:
-        """Whether the event has already happened."""
+        """Whether the event has already happened, so that the guard could not prevent it."""
         return self.objection in {"is broken by", "could not judge"}
 
     @property

@@ -27,7 +27,7 @@ KINDS_OF_MOVES = {PICK, PLACE}
 
 
 def name_of(label: str, request: str) -> str:
-    """Return the name that rules use for a room or thing: its label, or the request for a regex label."""
+    """Return a room's or thing's name in rules: its label, or the program's request if that is a regex."""
     is_name = PLAIN_LABEL.fullmatch(label) or not request or label.casefold() in request.casefold()
     return label if is_name else request
 
@@ -182,13 +182,13 @@ class RuleGuard:
         self._calls[row.name] -= 1
 
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
-        """Raise RuleViolationError if a possible next event (a drive if `is_drive`) would break a rule."""
+        """Raise RuleViolationError if a possible next event (all are drives if `is_drive`) breaks a rule."""
         found = list(self.find_violations(attempts, is_drive=is_drive))
         if found:
             raise min(found, key=lambda broken: not broken.ends_run)  # another rule may end the run
 
     def find_violations(self, attempts: Sequence[Event], *, is_drive: bool) -> Iterator[RuleViolationError]:
-        """Yield an error for each rule and possible next event (a drive if `is_drive`) that breaks it."""
+        """Yield an error for each rule and each possible next event (drives if `is_drive`) that breaks it."""
         attempts = tuple(map(_trimmed, attempts))
         leaves = is_drive and any(map(self._leaves, attempts[1:] or attempts))
         for rule, monitor in self._history.monitors:

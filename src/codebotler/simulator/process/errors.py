@@ -23,7 +23,7 @@ class ProtocolError(Exception):
 
 
 def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, RunError]:
-    """Explain the exit status (or negative signal) of a process with `seconds` of processor time."""
+    """Return a run's status and error, from its process's exit status or signal and processor time limit."""
     match -status:
         case signal.SIGXCPU:
             return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")

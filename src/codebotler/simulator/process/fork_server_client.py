@@ -55,7 +55,7 @@ class ForkServer:
             self._set_up()
         except (LostProcessError, OSError):
             self.close()
-            raise LostProcessError("the fork server did not start; memory may be short") from None
+            raise LostProcessError("the fork server did not start; the machine may lack memory") from None
         except BaseException:  # such as an interrupt
             self.close()
             raise

@@ -124,7 +124,7 @@ class ClosedProcess:
         if not answer:
             status = self._channel.end_gently()
             if status == -signal.SIGKILL:
-                raise LostProcessError("the process was killed from outside; memory may be short")
+                raise LostProcessError("the process was killed from outside; the machine may lack memory")
             _, fault = cause_of_death(status)
             raise IsolatedCallError(fault.kind, fault.message)
         data = json.loads(answer[1:])
@@ -156,7 +156,7 @@ os.register_at_fork(after_in_child=IDLE_PROCESSES.clear)
 
 
 def serve(module: str, descriptor: str) -> NoReturn:
-    """Call functions of a module on the engine's request, until it closes the channel `descriptor`."""
+    """Call functions of a module for the engine, until the engine closes the channel `descriptor`."""
     import unicodedata as _  # noqa: F401, PLC0415 - needed to parse "\N{...}", and cannot be imported later
 
     forget_the_shell()

@@ -24,7 +24,7 @@ WHOLE_MESSAGE = 2**31 - 1  # bytes, more than any message has
 
 
 class IsolatedProcess:
-    """The engine's handle on one isolated process."""
+    """Exchanges messages with one isolated process, and can kill it."""
 
     def __init__(
         self,
@@ -76,17 +76,17 @@ class IsolatedProcess:
         except (ValueError, RecursionError):
             message, end = None, 0
         if message is None or end < len(frame):
-            raise ProtocolError("a frame does not contain a message")
+            raise ProtocolError("a message is not valid JSON")
         return message
 
     def receive_bytes(self, most: int) -> bytes | None:
-        """Return the next frame, or None if the process has hung up. `most` limits the frame's bytes."""
+        """Return the next message as bytes, at most `most` of them, or None if the process has hung up."""
         used: int | None = None
         while True:
             if len(self._buffer) >= HEADER:
                 end = HEADER + int.from_bytes(self._buffer[:HEADER], "big")
                 if end - HEADER > most:
-                    raise ProtocolError("a frame is too long")
+                    raise ProtocolError(f"a message has more than {most:,} bytes")
                 if len(self._buffer) >= end:
                     frame = bytes(self._buffer[HEADER:end])
                     del self._buffer[:end]
@@ -131,7 +131,7 @@ class IsolatedProcess:
             self.hang_up()
 
     def end_gently(self) -> int:
-        """Wait 0.1 seconds for the process to exit, then kill it. Return what `end` returns."""
+        """Kill the process if it does not exit within 0.1 seconds. Return what `end` returns."""
         for _ in range(50):
             if _stat(self.pid)[:1] in ([], ["Z"]):
                 break
@@ -143,7 +143,7 @@ class IsolatedProcess:
         self.patience = PROCESS_WAIT_SECONDS
 
     def hang_up(self) -> None:
-        """Close the channel."""
+        """Close the channel to the process."""
         self._channel.close()
 
 

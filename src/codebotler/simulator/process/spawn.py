@@ -137,7 +137,7 @@ def stdlib_files() -> dict[str, Path]:
 
 
 def code_of(file: str, shown: str) -> bytes:
-    """Return a file's marshalled code, with any interpreter options. Tracebacks show the name `shown`."""
+    """Return a Python file's marshalled code, whatever our Python's options. Tracebacks call it `shown`."""
     code = None
     if not sys.flags.optimize:
         with contextlib.suppress(EOFError, ImportError, ValueError):  # the bytecode file is damaged

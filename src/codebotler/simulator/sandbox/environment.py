@@ -102,7 +102,7 @@ class Lock:
         self._is_held = False
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:  # noqa: FBT001, FBT002 - as in _thread
-        """Take a free lock, and return True. Else wait for the timeout; if there is none, end the run."""
+        """Take a free lock and return True. Else wait and return False, or without a timeout end the run."""
         if not blocking and timeout != -1:
             raise ValueError("can't specify a timeout for a non-blocking call")
         if not self._is_held:

@@ -178,7 +178,7 @@ class ProgramRun:
     def perform(
         self, name: str, parameters: list[tuple[type | str, ParameterDescription]], values: tuple[Any, ...]
     ) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Execute a skill. Raise TypeError for a wrong type, or a subclass of `str` or `list`."""
+        """Execute a skill. Raise TypeError or ValueError for a wrong argument, also a subclass of `str`."""
         for (kind, parameter), value in zip(parameters, values, strict=True):
             given: type = type(value)
             if given is not kind:
@@ -194,7 +194,7 @@ class ProgramRun:
         return result
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Ask the engine to execute a skill."""
+        """Ask the engine to execute a skill, and return its result."""
         kinds = self.kinds[name]
         given = [
             JSON_WRITERS.get(kind, _value_text)(value) for kind, value in zip(kinds, arguments, strict=True)
@@ -202,7 +202,7 @@ class ProgramRun:
         return self.request(f"{quoted(name)},[{','.join(given)}]")
 
     def sleep(self, seconds: object, /) -> None:
-        """Advance simulated time. The engine learns of it with the next request, or at the end."""
+        """Let `seconds` pass: on the simulated clock, or for a live robot on the real one."""
         if not isinstance(seconds, int | float):
             raise TypeError(f"{NAME_OF(type(seconds))!r} object cannot be interpreted as an integer")
         if not 0 <= seconds < float("inf"):
@@ -262,7 +262,7 @@ def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: ty
     if (given is int and not -MAX_EXACT_INT <= value <= MAX_EXACT_INT) or (
         given is float and value - value != 0
     ):
-        raise ValueError(f"{name}: {named} is out of range")
+        raise ValueError(f"{name}: {named} is out of range (infinite, not a number or beyond 2**53)")
 
 
 def _value_text(value: Any) -> str:  # noqa: ANN401 - a scalar or a list of them
@@ -311,7 +311,7 @@ NAME_OF: Callable[[type], str] = type.__dict__["__name__"].__get__
 
 
 class LimitReachedError(BaseException):
-    """The run has reached a limit. Each further loop iteration, function call or skill raises it again."""
+    """The run has reached a limit. Each further loop iteration, call or skill raises this error again."""
 
 
 class SkillError(Exception):

@@ -37,7 +37,7 @@ def enclose(seccomp: Filter | None, seconds: int) -> None:
 
 
 def set_limit(name: str, value: int) -> None:
-    """Permanently set a limit, such as NOFILE. Other systems than Linux lack some, or refuse small values."""
+    """Permanently set a resource limit, such as NOFILE. Outside Linux, ignore limits that are refused."""
     kind = getattr(resource, "RLIMIT_" + name, None)
     try:
         if kind is not None:

@@ -71,7 +71,7 @@ class WildError(Exception):
 
 
 def wild(*_: object) -> NoReturn:
-    """Reject a node: raise WildError."""
+    """Reject a part of a program: raise WildError."""
     raise WildError
 
 
@@ -97,7 +97,7 @@ def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
 
 
 class ProgramVerifier:
-    """Checks the parts of a program, and raises WildError for a part that is not in `ALLOWED`."""
+    """Raises WildError for a part of a program that is not allowed. `ALLOWED` has a check for each node."""
 
     def __init__(self, nodes: Nodes, skills: frozenset[str]) -> None:
         self.skills = skills

@@ -72,7 +72,7 @@ class SimulatedRobot(SimulatedWorld):
 
     @property
     def own_skills(self) -> tuple[str, ...]:
-        """The names of the skills that a copy of this robot in another process lacks, such as own skills."""
+        """The names of skills that a copy of this robot in a child process lacks, such as the user's own."""
         if "is_copied" not in vars(type(self)):
             return tuple(self.skills)
         if self.skills is SKILLS:
@@ -140,7 +140,7 @@ class SimulatedRobot(SimulatedWorld):
             nobody, is_named = f'nobody is in "{self.room}"', self.settings.matching == "longest-name"
             if is_named and any(one.is_here for one in self.people_here):
                 nobody = f'nobody in "{self.room}" fits "{person}"'
-            raise RobotError("AskNoPerson", f'{nobody} to be asked "{question}"')
+            raise RobotError("AskNoPerson", f'{nobody}, so nobody can answer "{question}"')
         answer = asked.answer(question, self.settings)
         chosen = None if answer is None else choose(answer, question, options, self.settings)
         if chosen is None:
@@ -210,7 +210,7 @@ class SimulatedRobot(SimulatedWorld):
         """Raise RobotError of a kind that the current skill declares in `fails`, or else UserError."""
         row = self._own_skill
         if row is None:
-            raise UserError(f'the error "{kind}" was raised outside a skill; call `fail` only in a skill')
+            raise UserError(f'`fail("{kind}")` was called outside a skill; call it only in a skill')
         declared = dict(row.fails)
         if kind not in declared:
             row.wrong(f'{row.name} declares no error "{kind}"; add it to `fails`, and say when it happens')

@@ -37,7 +37,7 @@ class SampledFact:
 
 
 def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True) -> SampledFact:
-    """Return the fact that a person or thing is, or is not, in a room. `normalized` has made the name."""
+    """Return the fact that a person or thing is, or is not, in a room. `normalized` returns such names."""
     if name == SOMEBODY:
         return SampledFact(f'{SOMEBODY if is_there else "nobody"} is in "{{}}"', (room,), is_random)
     return SampledFact(f'"{{}}" {"is" if is_there else "is not"} in "{{}}"', (name, room), is_random)

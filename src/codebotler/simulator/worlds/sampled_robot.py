@@ -342,7 +342,7 @@ class SampledRobot(SimulatedRobot):
         self.explored[goal].people |= {who, SOMEBODY}
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Ask a person, and return a random option's position. The person is here unless a look failed."""
+        """Ask a person, who is here unless a look failed (if strict, at random). Return a random position."""
         person, options = as_text(person), to_options(options)
         who = normalized(person)
         if not options or not self._answers(who):

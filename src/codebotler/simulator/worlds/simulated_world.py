@@ -182,7 +182,7 @@ class SimulatedWorld:
         words = self.settings.words_for_people or WORDS_FOR_PEOPLE
         meant = best_fits(name, [one.entity for one in everybody], words)
         if len(meant) != 1:
-            raise RobotError("AskNoPerson", f'"{name}" cannot be moved, since it does not mean one person')
+            raise RobotError("AskNoPerson", f'"{name}" cannot be moved: use a name that fits one person')
         for here in self.occupants.values():
             here[:] = [one for one in here if one is not everybody[meant[0]]]
         self.occupants[goal].append(everybody[meant[0]])
