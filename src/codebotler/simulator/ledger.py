@@ -149,8 +149,7 @@ def too_long(limits: Limits) -> str:
 class RememberingLedger(Ledger):
     """Counts the calls of a simulated run, and caches the answers to calls that change nothing.
 
-    Caching helps programs that look a thousand times while they wait for something. It starts late, because
-    most programs make too few calls for it to pay off.
+    This helps programs that look a thousand times while they wait. It starts after UNREMEMBERED_CALLS calls.
     """
 
     def __init__(self, robot: SimulatedRobot) -> None:

@@ -278,12 +278,10 @@ class ResultFile:
 
 
 def shared_pool() -> WorkerPool:
-    """Return this process's pool, started on first use with a worker per core. A fork gets its own pool.
-
-    There are at least two workers, so that the check of an agent's program does not hold up a person's.
-    """
+    """Return this process's pool, started on first use with a worker per core. A fork gets its own pool."""
     with SHARED_POOL.lock:
         if SHARED_POOL.pool is None:
+            # With two workers, the check of an agent's program does not hold up the check of a person's.
             workers = max(2, cores())
             SHARED_POOL.pool = WorkerPool(workers).__enter__()  # raises EngineError if it cannot start
         return SHARED_POOL.pool

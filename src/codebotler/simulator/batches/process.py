@@ -63,11 +63,9 @@ def main(*descriptors: str) -> None:
 
 
 def execute(run: TranscribedRun, rehearsal: Batch) -> NoReturn:
-    """Run the batches that the engine sends, and send back transcripts, until the engine hangs up.
-
-    A child is forked before it is needed, and first runs a rehearsal, because the kernel copies each page on
-    the first write to it, which takes longer than most batches.
-    """
+    """Run the batches that the engine sends, and send back transcripts, until the engine hangs up."""
+    # A child is forked before it is needed, and first runs a rehearsal, because the kernel copies each page
+    # on the first write to it, which takes longer than most batches.
     transcripts(run, rehearsal)
     while True:
         transcripts(run, receive(), send_frames)

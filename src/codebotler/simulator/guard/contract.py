@@ -127,9 +127,7 @@ class Contract:
     def objection(self, call: RequestedCall, earlier: int = 0) -> str:
         """Return the reason against a call, such as "since ask may not be called"; "" if it is allowed.
 
-        Args:
-            call: the call that a program wants to make.
-            earlier: how many calls of this skill have succeeded before in the run.
+        `earlier` is how many calls of this skill have succeeded before in the run.
         """
         bound = self.skills.get(call.skill)
         if call.skill in TELLING_SKILLS:

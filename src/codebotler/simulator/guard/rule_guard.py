@@ -145,11 +145,9 @@ class RuleGuard:
             self._history = history
 
     def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
-        """Raise RuleViolationError if the next event inside one of the user's own skills would break a rule.
-
-        Events inside a skill are provisional: the skill's own event may come before them, but its result is
-        not known until the call ends.
-        """
+        """Raise RuleViolationError if the next event inside a user's own skill would break a rule."""
+        # Events inside a skill are provisional: the skill's own event may come before them, but its result is
+        # not known until the call ends.
         if not self._is_own:
             return
         earlier, self._seen = robot.events[self._seen :], len(robot.events)
@@ -165,11 +163,7 @@ class RuleGuard:
     def judge_call(self, row: Skill, arguments: Sequence[Argument], goals: Sequence[str], place: str) -> None:
         """Count the next call, or raise RuleViolationError if a contract does not allow it.
 
-        Args:
-            row: the skill.
-            arguments: its arguments.
-            goals: the rooms that the goal of a drive may mean, as rules name them.
-            place: the robot's room, or "" if it is unknown.
+        `goals` is from `goals_of_call`. `place` is the robot's room, or "" if it is unknown.
         """
         for contract in self.contracts:
             call = RequestedCall.of(row, arguments, goals, place)

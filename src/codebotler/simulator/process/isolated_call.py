@@ -91,10 +91,8 @@ def isolated(
 ) -> Callable[[Callable[_Arguments, _Result]], IsolatedFunction[_Arguments, _Result]]:
     """Make a module's function run in a closed process.
 
-    The function's arguments are pickled. Its result is returned as JSON, in which tuples become lists.
-
-    Args:
-        rehearsal: the arguments of a first call, which each new process makes before it is closed.
+    The function's arguments are pickled, and its result is returned as JSON, in which tuples become lists.
+    Each new process first makes a call with the arguments `rehearsal`, before it is closed.
     """
     return lambda function: IsolatedFunction(function, rehearsal)
 

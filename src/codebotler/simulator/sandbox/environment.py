@@ -91,11 +91,9 @@ def simulate_time(run: ProgramRun) -> None:
 
 
 class Lock:
-    """Replaces `_thread.lock`. No other thread could release it, so a wait only passes simulated time.
+    """Replaces `_thread.lock`. No other thread could release it, so a wait only passes simulated time."""
 
-    An `RLock` needs no replacement, since the only thread never waits for it.
-    """
-
+    # An `RLock` needs no replacement, since the only thread never waits for it.
     run: ProgramRun
 
     def __init__(self) -> None:

@@ -112,11 +112,9 @@ def hide_folders() -> None:
 
 
 class Select:
-    """Replaces `select.select`: waiting for files is forbidden, and a wait without files is a sleep.
+    """Replaces `select.select`: waiting for files is forbidden, and a wait without files is a sleep."""
 
-    This is a class, since a function would become a method in `selectors`.
-    """
-
+    # This is a class, since a function would become a method in `selectors`.
     def __init__(self, run: ProgramRun) -> None:
         self.run = run
 

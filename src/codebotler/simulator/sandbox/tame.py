@@ -82,13 +82,7 @@ def parameters_of(given: ast.arguments) -> list[str]:
 
 
 def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
-    """Return whether a program is tame, so that it may share a process with others.
-
-    Args:
-        tree: the program's syntax tree.
-        nodes: all nodes of the tree by type.
-        skills: the names of the skills that the program may call.
-    """
+    """Return whether a program may share a process with others. `nodes` are its tree's nodes by type."""
     try:
         ProgramVerifier(nodes, skills).check(*tree.body)
     except (WildError, RecursionError):

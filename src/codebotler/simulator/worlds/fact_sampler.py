@@ -12,14 +12,23 @@ EIGHTS = 8
 
 @dataclass(frozen=True)
 class FactSampler:
-    """Chooses the random facts of one sampled world. The order in which they are chosen does not matter."""
+    """Chooses the random facts of one sampled world. The order in which they are chosen does not matter.
+
+    Args:
+        seed: a number that determines all results together with `sample`.
+        sample: the number of this world among the worlds with the same seed.
+        strict: whether facts that the program takes for granted are random as well; if not, they are true.
+        lucky: whether seven of eight choices are good: things and people are there, and people agree.
+        forced: facts with given results, which are not chosen at random.
+        by_options: whether an answer depends on the room and the options, and not on the question.
+    """
 
     seed: int = 0
-    sample: int = 0  # number of this world among the worlds with the same seed
-    strict: bool = False  # also draw facts that the program takes for granted; otherwise they hold
-    lucky: bool = False  # in seven of eight draws, things and people are present, and people agree
-    forced: tuple[Draw, ...] = ()  # facts whose results are given instead of drawn
-    by_options: bool = False  # an answer depends on the room and the options, not on the question
+    sample: int = 0
+    strict: bool = False
+    lucky: bool = False
+    forced: tuple[Draw, ...] = ()
+    by_options: bool = False
 
     def draw(self, count: int, *fact: str) -> int:
         """Return a random number from 0 to `count - 1` for a fact, always the same for the same texts."""

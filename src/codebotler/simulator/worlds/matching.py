@@ -75,10 +75,7 @@ _WORD = re.compile(r"[\w'\u2019-]+")
 def meant_by(request: str, labels: Iterable[str], *, plain: bool = False) -> list[str]:
     """Return the label that equals a request, or else each label that matches the most of its whole words.
 
-    Args:
-        request: what a program asks for, such as "the red mug".
-        labels: regexes, as in world files.
-        plain: whether the labels are plain names instead.
+    `labels` are regexes, as in world files, or plain names if `plain` is true.
     """
     labels = tuple(labels)
     return [*_meant_by(request, labels, tuple(map(_escaped, labels)) if plain else labels)]
@@ -89,11 +86,7 @@ def goals_meant(
 ) -> list[str]:
     """Return the rooms and places that a request may mean. "The desk in the office" means only the desk.
 
-    Args:
-        request: what a program asks for, such as "the desk in the office".
-        goals: the rooms and places.
-        around: the room that contains each place.
-        plain: whether rooms and places are plain names instead of regexes.
+    `goals` are all rooms and places, as regexes or, if `plain`, names. `around` maps each place to its room.
     """
     if not around:
         return meant_by(request, goals, plain=plain)
@@ -150,10 +143,7 @@ def best_fits(request: str, entities: Sequence[Entity], anybody: Sequence[str] =
     The result has several positions only if the request contains the names of several entities. If several
     fit only by their traits ("the tall person"), or have equal names, it has only the first one.
 
-    Args:
-        request: what a program asks for, such as "the red mug".
-        entities: the candidates.
-        anybody: regexes for words that mean any of the candidates, such as "person".
+    `anybody` contains regexes for words that mean any of the entities, such as "person".
     """
     counts = [_fit(request, *entity, tuple(anybody)) for entity in entities]
     best = [number for number, count in enumerate(counts) if count == max(counts) > 0]

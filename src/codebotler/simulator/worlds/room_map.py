@@ -14,18 +14,31 @@ from codebotler.simulator.worlds.matching import goals_meant
 
 @dataclass(frozen=True)
 class RoomMap:
-    """The rooms, names, properties and past events that are known before random facts are chosen."""
+    """The rooms, names, properties and past events that are known before random facts are chosen.
 
-    rooms: tuple[str, ...]  # in the order in which the robot lists them
+    Args:
+        rooms: the names of the rooms, in the order in which the robot lists them.
+        start: the room where the robot starts.
+        guessed: whether the rooms are a guess; if so, any other place that a program names exists as well.
+        plain: whether names are plain text and not regexes, as always on real robots.
+        plan: the rooms with their footprints, and with stopping points if the robot drives straight.
+        things: the names of known things, which may be anywhere.
+        people: the names of known people, who may be anywhere.
+        traits: the name and the properties of each thing or person that has properties.
+        places: the name of each place in a room, and the name of the room.
+        past: what the robot did and saw before the program begins.
+    """
+
+    rooms: tuple[str, ...]
     start: str
-    guessed: bool = False  # the rooms are a guess: any other place a program drives to exists as well
-    plain: bool = False  # names are plain text and not regexes, as always on real robots and guessed maps
-    plan: tuple[Room, ...] = ()  # footprints, and stopping points if the robot drives straight between rooms
-    things: tuple[str, ...] = ()  # the names of known things, which may be anywhere
-    people: tuple[str, ...] = ()  # the names of known people, who may be anywhere
-    traits: tuple[tuple[str, tuple[Trait, ...]], ...] = ()  # their properties
-    places: tuple[tuple[str, str], ...] = ()  # the places, each with the room that contains it
-    past: Trace = ()  # what the robot did and saw before the program begins
+    guessed: bool = False
+    plain: bool = False
+    plan: tuple[Room, ...] = ()
+    things: tuple[str, ...] = ()
+    people: tuple[str, ...] = ()
+    traits: tuple[tuple[str, tuple[Trait, ...]], ...] = ()
+    places: tuple[tuple[str, str], ...] = ()
+    past: Trace = ()
 
     def __post_init__(self) -> None:
         compose_fields(self)
