@@ -149,7 +149,7 @@ class Unwalled(Bare):
 
     def request(self, request: str) -> Any:  # noqa: ANN401 - as in ProgramRun
         """End the run, because its time is over or it waits forever."""
-        self.limit = self.limit or self.too_late() or "it waits for something that can never happen"
+        self.limit = self.limit or self.too_late() or "a wait for something that can never happen"
         return super().request(request)
 
     def too_late(self) -> str | None:
@@ -194,7 +194,9 @@ class Unwalled(Bare):
         if status is Status.FINISHED:
             return Outcome(status, self.robot.trace)
         if status is Status.TIMEOUT:
-            error = RunError("TimeoutError", self.limit or f"{self.limits.ticks:,} turns of loops")
+            error = RunError(
+                "TimeoutError", self.limit or f"{self.limits.ticks:,} loop iterations and function calls"
+            )
         elif status is Status.ROBOT_ERROR:
             failure = self.errors[final["number"]]
             error = RunError(failure.kind, str(failure))

@@ -1,4 +1,4 @@
-"""Look for an object or a person in an image."""
+"""Detectors, which look for an object or a person in an image, and functions that read images."""
 
 from codebotler.perception.base import Detector, PerceptionError, Sighting
 from codebotler.perception.image import boxed, image_from_ros, image_of, jpeg_of, read_image

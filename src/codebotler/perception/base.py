@@ -11,7 +11,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 
 Box: TypeAlias = tuple[float, float, float, float]
-"""Left, top, right and bottom, as fractions of the image's width and height from its top left corner."""
+"""The left, top, right and bottom edges of a box, as fractions of the image's size from its top left."""
 
 MAX_LABEL_CHARACTERS = 200
 
@@ -21,9 +21,9 @@ class Sighting:
     """The result of looking for something in an image.
 
     Args:
-        found: whether the image shows it.
-        box: the box around the clearest match, or None if nothing was found.
-        score: the confidence, from 0 to 1. Scores from different models are not comparable.
+        found: whether the image shows the object or person.
+        box: the box around the clearest match, or None if `found` is False.
+        score: the model's confidence, from 0 to 1. Scores from different models are not comparable.
 
     Raises:
         ValueError: the score or box is out of range.
@@ -35,13 +35,13 @@ class Sighting:
 
     def __post_init__(self) -> None:
         if not 0 <= self.score <= 1:
-            raise ValueError(f"the score is {self.score}; it must be between 0 and 1")
+            raise ValueError(f"the score {self.score} is not between 0 and 1")
         if self.box is None:
             return
         left, top, right, bottom = self.box
         if not (0 <= left < right <= 1 and 0 <= top < bottom <= 1):
             raise ValueError(
-                f"the box is {list(self.box)}; use left < right and top < bottom, each between 0 and 1"
+                f"the box {list(self.box)} is wrong; use left < right and top < bottom, each between 0 and 1"
             )
 
 
@@ -65,11 +65,11 @@ class Detector(Protocol):
         """
 
     def close(self) -> None:
-        """Release connections and memory."""
+        """Release connections and memory. The detector cannot be used afterwards."""
 
 
 class PerceptionError(Exception):
-    """Raised when a detector fails. The sentence gives the reason and contains no API keys."""
+    """A detector has failed. The sentence gives the reason and contains no API keys."""
 
     def __init__(self, sentence: str) -> None:
         super().__init__(sentence)

@@ -26,7 +26,7 @@ FENCED_JSON = re.compile(r"```(?:json)?[^\S\n]*\n(.*)\n[^\S\n]*```", re.DOTALL)
 
 
 class ChatDetector:
-    """Detects objects by asking a chat model. Threads may share a detector, but must take turns."""
+    """Looks for objects and people by asking a chat model. Only one thread at a time may use it."""
 
     def __init__(self, model: Model) -> None:
         self.name = model.name
@@ -34,7 +34,7 @@ class ChatDetector:
         self._model = RateLimited(model, retries=REQUEST_RETRIES)
 
     def look(self, image: Image, label: str) -> Sighting:
-        """Show the image to the model, and ask again if the reply is invalid."""
+        """Look for a label in an image. Raise PerceptionError if the model fails or 3 replies are invalid."""
         question = PictureMessage("user", json.dumps(clean_label(label)), jpeg_of(image))
         messages: tuple[PromptMessage, ...] = (PromptMessage("system", DETECTOR_PROMPT), question)
         fault = text = ""
@@ -50,11 +50,11 @@ class ChatDetector:
                 fault, text = str(error), reply.text.strip()[:MAX_REPLY_CHARACTERS]
             answer = [PromptMessage("assistant", text)] if text else []
             messages = (*messages[:2], *answer, PromptMessage("user", RETRY_PROMPT.format(fault=fault)))
-        last = f"; it replied: {error_text(text)}" if text else ""
-        raise PerceptionError(f"{self.name} gave no valid answer in {MAX_REPLIES} attempts: {fault}{last}")
+        last = f"; the last reply was: {error_text(text)}" if text else ""
+        raise PerceptionError(f"{self.name} gave no valid reply in {MAX_REPLIES} attempts: {fault}{last}")
 
     def close(self) -> None:
-        """Close the connections."""
+        """Close the connections to the model's server."""
         self._runner.run(self._model.close())
         self._runner.close()
 
@@ -68,18 +68,18 @@ class _DetectorAnswer(BaseModel):
 
 
 def parse_sighting(text: str) -> Sighting:
-    """Parse a JSON reply, with or without a code fence. Raise ValueError if it is invalid."""
+    """Parse a model's JSON reply, with or without a code fence. Raise ValueError if the reply is invalid."""
     if len(text) > MAX_REPLY_CHARACTERS:
-        raise ValueError(f"it has {len(text):,} characters")
+        raise ValueError(f"the reply has {len(text):,} characters; use at most {MAX_REPLY_CHARACTERS:,}")
     fenced = FENCED_JSON.fullmatch(text.strip())
     try:
         answer = _DetectorAnswer.model_validate_json(fenced[1] if fenced else text)
     except ValidationError as error:
         first = error.errors()[0]
-        fault = f'"{first["loc"][0]}": {first["msg"]}' if first["loc"] else "it is not a JSON object"
+        fault = f'"{first["loc"][0]}": {first["msg"]}' if first["loc"] else "the reply is not a JSON object"
         raise ValueError(fault) from None
     if not answer.found:
         return Sighting(found=False, box=None, score=answer.score)
     if answer.box is None:
-        raise ValueError('"box" is missing')
+        raise ValueError('"found" is true, but "box" is missing')
     return Sighting(found=True, box=answer.box, score=answer.score)

@@ -28,15 +28,15 @@ ENCODINGS: Mapping[str, tuple[str, str]] = {
     "bgra8": ("RGBA", "BGRA"),
     "mono8": ("L", "L"),
 }
-"""Maps each supported sensor_msgs/Image encoding to Pillow's mode and the order of its bytes."""
+"""Maps each supported encoding of sensor_msgs/Image to Pillow's mode and the order of a pixel's bytes."""
 
 
 def image_of(data: bytes, name: str = "the picture") -> Image.Image:
-    """Decode a JPEG, PNG or WebP image, upright and in RGB. Raise a UserError with `name` if that fails."""
+    """Decode a JPEG, PNG or WebP file to an upright RGB image. If that fails, raise UserError for `name`."""
     if not data:
-        raise UserError(f"{name} is empty")
+        raise UserError(f"{name} is empty; use a JPEG, PNG or WebP image")
     if len(data) > MAX_IMAGE_BYTES:
-        raise UserError(f"{name} is larger than {MAX_IMAGE_BYTES:,} bytes; use a smaller one")
+        raise UserError(f"{name} is larger than {MAX_IMAGE_BYTES:,} bytes; use a smaller image")
     try:
         with warnings.catch_warnings(action="ignore", category=Image.DecompressionBombWarning):
             opened = Image.open(io.BytesIO(data), formats=IMAGE_FORMATS)
@@ -46,25 +46,25 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
     except UserError:
         raise
     except UnidentifiedImageError:
-        raise UserError(f"{name} is not a JPEG, PNG or WebP file") from None
+        raise UserError(f"{name} is not a JPEG, PNG or WebP file; convert it to one of these") from None
     except Exception as error:  # noqa: BLE001 - a decoder may raise any error
-        raise UserError(f"{name} is damaged or incomplete ({error_text(error)})") from None
+        raise UserError(f"{name} is damaged or incomplete: {error_text(error)}") from None
 
 
 def read_image(path: Path) -> Image.Image:
-    """Read an image file, or raise UserError if that fails."""
+    """Read a JPEG, PNG or WebP file as an upright RGB image. Raise UserError if that fails."""
     return image_of(read_bytes(path, MAX_IMAGE_BYTES + 1), str(path))
 
 
 def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> Image.Image:
-    """Decode a sensor_msgs/CompressedImage, or a sensor_msgs/Image with a common encoding.
+    """Decode a ROS message: a sensor_msgs/CompressedImage, or a sensor_msgs/Image in one of `ENCODINGS`.
 
-    `data` must be in base64. Raise a UserError that contains `name` if there is no image or it is too large.
+    The message is a dict with `data` in base64. If there is no usable image, raise UserError for `name`.
     """
     try:
         data = base64.b64decode(message["data"], validate=True)  # type: ignore[arg-type]  # a text, or an error
     except (LookupError, TypeError, ValueError):
-        raise UserError(f"{name} is not an image message") from None
+        raise UserError(f"{name} is not an image message; use an Image or CompressedImage") from None
     match message:
         case {"encoding": str(encoding), "width": int(width), "height": int(height), "step": int(step)}:
             return _decode_raw(encoding, (width, height), step, data, name)
@@ -84,7 +84,7 @@ def _decode_raw(encoding: str, size: tuple[int, int], step: int, data: bytes, na
 
 
 def jpeg_of(image: Image.Image) -> bytes:
-    """Encode an image as a JPEG without metadata, scaled down if it is large."""
+    """Encode an image as a JPEG without metadata, scaled down to at most 1,024 pixels on each side."""
     smaller = _to_rgb(image)
     smaller.thumbnail((LONGEST_SIDE, LONGEST_SIDE))
     file = io.BytesIO()
@@ -93,7 +93,7 @@ def jpeg_of(image: Image.Image) -> bytes:
 
 
 def boxed(image: Image.Image, sighting: Sighting) -> Image.Image:
-    """Return a copy of an image, with a frame around the sighting if something was found."""
+    """Return a copy of an image, with a yellow frame around the sighting's box if there is one."""
     drawn = image.copy()
     if sighting.box is None:
         return drawn

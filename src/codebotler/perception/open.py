@@ -8,7 +8,7 @@ from codebotler.models.sampling import SamplingSettings
 from codebotler.perception.base import Detector
 
 DETECTOR_SETTINGS = SamplingSettings(temperature=0.0, top_p=None, timeout=30.0)
-"""The default sampling settings of a chat model."""
+"""The default sampling settings of a chat model that is used as a detector."""
 MIN_SCORE = 0.1
 
 
@@ -21,14 +21,14 @@ def open_detector(
         name: `provider:name` of a chat model that accepts images, as in pydantic-ai, or `hf:PATH` of a
             zero-shot object detector: a folder, or a name on the Hugging Face hub.
         settings: sampling settings, used by chat models only.
-        least_score: the lowest score, above 0 and at most 1, that a zero-shot detector reports as found.
+        least_score: the lowest score, above 0 and at most 1, at which a zero-shot detector says "found".
 
     Raises:
         UserError: the model does not exist or does not accept images, or a key or package is missing.
     """
     kind = kind_of(name)
     if kind in {"recorded", "completions"}:
-        raise UserError(f"{name} does not accept pictures; use a chat model that does, or hf:PATH")
+        raise UserError(f"{name} does not accept pictures; use a chat model that accepts them, or hf:PATH")
     # Each of these modules imports a large library, so import only the one needed.
     if kind != "hf":
         with installed():

@@ -19,12 +19,12 @@ PIPELINE_TASK = "zero-shot-object-detection"
 
 
 class ZeroShotDetector:
-    """Runs a zero-shot object detector in this process, on a GPU if one is available."""
+    """Looks for objects and people with a zero-shot model in this process, on a GPU if there is one."""
 
     def __init__(self, path: str, *, least_score: float) -> None:
         self.name = f"hf:{path}"
         if not 0 < least_score <= 1:
-            raise UserError(f"the minimum score is {least_score:g}; it must be above 0 and at most 1")
+            raise UserError(f"the least score {least_score:g} is invalid; use one above 0 and at most 1")
         self._least = least_score
         source = find_source(path)
         transformers.utils.logging.disable_progress_bar()
@@ -38,17 +38,17 @@ class ZeroShotDetector:
             ) from None
         guard_logs()
         if not all(bool(torch.isfinite(weight).all()) for weight in self._pipeline.model.parameters()):
-            raise UserError(f"{self.name} has weights that are not finite; use another model")
+            raise UserError(f"{self.name} has weights that are infinite or not numbers; use another model")
 
     def look(self, image: Image, label: str) -> Sighting:
-        """Return the best match for a label. It counts as found if its score is at least `least_score`."""
+        """Return the best match for a label in an image, found if its score is at least `least_score`."""
         words = clean_label(label)
         self._check_length(words)
         try:
             # Pass a list because the pipeline splits a string at commas.
             places = self._pipeline(image, candidate_labels=[words], threshold=0.0, top_k=1)
         except Exception as error:  # noqa: BLE001 - a model's own code may raise any error
-            raise PerceptionError(f"{self.name}: {error_text(error)}") from None
+            raise PerceptionError(f"{self.name} failed: {error_text(error)}") from None
         if not places:
             return Sighting(found=False, box=None, score=0.0)
         score, box = float(places[0]["score"]), places[0]["box"]
@@ -60,7 +60,7 @@ class ZeroShotDetector:
         return Sighting(found=True, box=(left, top, right, bottom), score=score)
 
     def close(self) -> None:
-        """Release the model's memory."""
+        """Release the model's memory. The detector cannot be used afterwards."""
         del self._pipeline
 
     def _check_length(self, words: str) -> None:
@@ -68,7 +68,7 @@ class ZeroShotDetector:
         text = getattr(self._pipeline.model.config, "text_config", None)
         most = getattr(text, "max_position_embeddings", None) or length
         if length > most:
-            raise UserError(f'the label "{words}" has {length} tokens; use at most {most} for {self.name}')
+            raise UserError(f'the label "{words}" has {length} tokens, but {self.name} reads at most {most}')
 
 
 def _to_shares(first: int, last: int, side: int) -> tuple[float, float]:

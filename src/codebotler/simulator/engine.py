@@ -25,7 +25,7 @@ def run(
     skills: SkillTable = SKILLS,
     require_isolation: bool = False,
 ) -> Iterator[Outcome]:
-    """Run pairs of a program and a world lazily, and yield the outcomes in the same order."""
+    """Run each program in its world, and yield the outcomes in order, by default with a worker per core."""
     with WorkerPool(workers or cores(), require_isolation=require_isolation) as pool:
 
         def run_pairs(pairs: Sequence[tuple[str, World]]) -> list[Outcome]:

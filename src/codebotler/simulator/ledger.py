@@ -14,11 +14,11 @@ from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
 
 UNREMEMBERED_CALLS = 50  # calls of a run before answers are cached
 OPTION_OVERHEAD = 10  # characters counted for each option, since even an empty one takes memory
-WAITS = "it waits for something that can never happen"
+WAITS = "a wait for something that can never happen"
 MAX_LINE = 1_000_000
 MAX_MESSAGE = 1_000  # characters, since a robot's error may quote a whole request
 SkillAnswer: TypeAlias = tuple[str, Any]
-"""`ok` with the result, `error` with number, kind and message, or `stop` with True if a rule is the cause."""
+"""`ok` and the result, `error` and (number, kind, message), or `stop` and True if a rule ended the run."""
 STOP: SkillAnswer = ("stop", None)
 STOPPED_BY_RULE: SkillAnswer = ("stop", True)
 
@@ -33,21 +33,21 @@ class SkillPerformer(Protocol):
 
     @property
     def now(self) -> float:
-        """The program's clock, in seconds since the start."""
+        """The time on the program's clock, in seconds since the start of the run."""
 
     @property
     def trace(self) -> Trace:
         """The robot's trace so far."""
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill, or raise RobotError."""
+        """Execute one skill, and return its result. Raise RobotError if the skill fails."""
 
     def sleep_until(self, now: float) -> None:
         """Let time pass until `now` seconds since the start, or until the robot is stopped."""
 
 
 def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, float, bool]:
-    """Return what a child needs to run a program: fuel, time, time limit, start of clocks, if it is live."""
+    """Return a run's fuel, time, time limit and clock start (in seconds), and whether the robot is live."""
     settings, limits = robot.settings, robot.settings.limits
     return limits.ticks, robot.now, limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 
@@ -63,7 +63,7 @@ class Ledger:
         self.broken: RobotError | None = None  # the error of the rule that ended the run
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:
-        """Let the robot execute one skill, unless the run has reached a limit."""
+        """Let the robot execute one skill, or return `STOP` if the run has reached a limit."""
         self._spend(arguments)
         if self.limit is not None:
             return STOP
@@ -78,7 +78,7 @@ class Ledger:
         return ("ok", result)
 
     def let_time_pass(self, now: float) -> None:
-        """Advance simulated time to `now` seconds since the start, but not beyond its limit."""
+        """Advance simulated time to `now` seconds since the start, or to its limit, which ends the run."""
         if now > self.limits.seconds:
             now = self.limits.seconds
             self.limit = f"{self.limits.seconds:,.0f} seconds of simulated time"
@@ -95,9 +95,8 @@ class Ledger:
             case {"end": "finished"}:
                 return Outcome(Status.FINISHED, self.robot.trace)
             case {"end": "timeout"}:
-                return self.outcome(
-                    Status.TIMEOUT, "TimeoutError", f"{self.limits.ticks:,} turns of loops", line
-                )
+                limit = f"{self.limits.ticks:,} loop iterations and function calls"
+                return self.outcome(Status.TIMEOUT, "TimeoutError", limit, line)
             case {"end": "robot-error", "number": int(number)} if 0 <= number < len(self.errors):
                 error = self.errors[number]
                 return self.outcome(Status.ROBOT_ERROR, error.kind, str(error), line)
@@ -109,7 +108,7 @@ class Ledger:
                 return self.outcome(Status.KILLED, "Crash", "the program wrote to the sandbox channel")
 
     def outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:
-        """Return the outcome of a run that ended with an error."""
+        """Return the outcome of a run that ended with an error, at `line` if that is a valid line number."""
         where = line if type(line) is int and 0 < line <= MAX_LINE else None
         return Outcome(status, self.robot.trace, RunError(kind, message[:MAX_MESSAGE]), where)
 
@@ -135,7 +134,7 @@ class Ledger:
 
 
 def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
-    """Return the outcome, or an error instead if the program finished but breaks a rule at the end."""
+    """Return the outcome, or a robot error instead if the program finished but broke a rule by ending."""
     unkept = robot.guard.at_end() if robot.guard is not None and outcome.error is None else None
     if unkept is None:
         return outcome
@@ -143,15 +142,14 @@ def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
 
 
 def too_long(limits: Limits) -> str:
-    """Describe the limit on the length of a string."""
+    """Return the limit on the length of one text in words, such as "a text of more than 50 characters"."""
     return f"a text of more than {limits.text:,} characters"
 
 
 class RememberingLedger(Ledger):
-    """The ledger of a simulated run, which caches the answers to calls that change nothing.
+    """Counts the calls of a simulated run, and caches the answers to calls that change nothing.
 
-    Caching helps programs that look a thousand times while they wait for something. It starts late, because
-    most programs make too few calls for it to pay off.
+    This helps programs that look a thousand times while they wait. It starts after UNREMEMBERED_CALLS calls.
     """
 
     def __init__(self, robot: SimulatedRobot) -> None:

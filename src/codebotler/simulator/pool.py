@@ -39,8 +39,8 @@ class WorkerPool:
     """Runs functions in threads that each own one worker.
 
     The first worker starts in the background. As a context manager, the pool waits for it on entry. With
-    `contextlib.closing`, only the first call waits. Without seccomp, the pool warns, or fails if isolation is
-    required.
+    `contextlib.closing`, only the first call waits. Without seccomp, the pool warns, or raises EngineError if
+    isolation is required. `Worker` explains `one_process_per_run`.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class WorkerPool:
         self._idle.append(first)
 
     def __enter__(self) -> Self:
-        """Wait for the first worker."""
+        """Wait for the first worker. Raise EngineError if it cannot start."""
         try:
             self._first.result()
         except BaseException:
@@ -81,7 +81,7 @@ class WorkerPool:
         self.close()
 
     def close(self) -> None:
-        """End all workers and threads."""
+        """Stop all runs, and end all workers and threads."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         self._stopping = True
         for worker in self._workers:
@@ -108,12 +108,12 @@ class WorkerPool:
     def submit(
         self, function: Callable[_Arguments, _Value], *args: _Arguments.args, **kwargs: _Arguments.kwargs
     ) -> Future[_Value]:
-        """Call a function in a pool thread, where `here` returns the thread's worker."""
+        """Call a function in a pool thread, where `here` returns a worker. Return a Future of the result."""
         return self._threads.submit(function, *args, **kwargs)
 
     @property
     def is_here(self) -> bool:
-        """Whether this is a pool thread, which must not wait for another pool thread."""
+        """Whether the calling thread is a pool thread, which must not wait for another pool thread."""
         return getattr(self._local, "is_ours", False)
 
     def call(self, function: Callable[[], _Value]) -> _Value:
@@ -128,7 +128,7 @@ class WorkerPool:
         name: Callable[[_Key], bytes],
         then: Callable[[_Called], Any] = lambda result: result,
     ) -> Iterator[Any]:
-        """Call a function on batches of keys in pool threads. `map_batches` explains the arguments."""
+        """Call a function on batches of keys in pool threads, and yield results as `map_batches` does."""
         return map_batches(
             lambda some: self.submit(function, some),
             keys,
@@ -203,7 +203,7 @@ def _next(queue: SimpleQueue[_Value]) -> _Value:
 
 
 class DistinctKeys(Generic[_Key]):
-    """Reads named keys in advance, and returns them in batches without duplicates."""
+    """Reads keys in advance, and returns them in batches. A key whose name has occurred is left out."""
 
     def __init__(self, keys: Iterable[_Key], name: Callable[[_Key], bytes]) -> None:
         self._keys, self._name = iter(keys), name
@@ -216,9 +216,9 @@ class DistinctKeys(Generic[_Key]):
     def batch(self, width: int) -> dict[bytes, _Key]:
         """Return the next keys by name, for one of `width` concurrent calls.
 
-        There are none at the end, or while too many keys are waiting. Batches start small so that the first
-        results come soon, and end small so that all calls end together. An error while reading the keys
-        counts as the result of the next key.
+        The batch is empty at the end, or while too many keys wait for results. Batches start small so that
+        the first results come soon, and end small so that all calls end together. An error while reading the
+        keys counts as the result of the next key.
         """
         size = min(MAX_BATCH_KEYS, max(MIN_BATCH_KEYS, self._sent // 2))
         self._read(size * width)
@@ -278,12 +278,10 @@ class ResultFile:
 
 
 def shared_pool() -> WorkerPool:
-    """Return this process's pool, started on first use with a worker per core. A fork gets its own pool.
-
-    There are at least two workers, so that the check of an agent's program does not hold up a person's.
-    """
+    """Return this process's pool, started on first use with a worker per core. A fork gets its own pool."""
     with SHARED_POOL.lock:
         if SHARED_POOL.pool is None:
+            # With two workers, the check of an agent's program does not hold up the check of a person's.
             workers = max(2, cores())
             SHARED_POOL.pool = WorkerPool(workers).__enter__()  # raises EngineError if it cannot start
         return SHARED_POOL.pool
@@ -301,7 +299,7 @@ class SharedPool:
         )
 
     def end(self) -> None:
-        """Close the pool."""
+        """Close the pool if it has started."""
         with self.lock:
             if self.pool is not None:
                 self.pool.close()

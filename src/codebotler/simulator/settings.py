@@ -14,35 +14,49 @@ from codebotler.simulator.worlds.matching import Matching, finds
 
 @dataclass(frozen=True)
 class Limits:
-    """The resources that one run may use. Beyond any limit, it ends with status `timeout`."""
+    """The resources that one run may use. A run that exceeds one of them ends with status `timeout`.
 
-    seconds: float = 3600.0  # simulated seconds
-    calls: int = 1_000  # skill calls; sleeping does not count
-    ticks: int = 200_000  # fuel: loop iterations and function calls
-    text: int = 10_000  # characters of one text passed to a skill
-    trace: int = 1_000_000  # characters of all texts in a trace
+    Args:
+        seconds: the simulated time, in seconds.
+        calls: the number of skill calls, without calls of `time.sleep`.
+        ticks: the number of loop iterations and function calls (fuel).
+        text: the number of characters of one text that is passed to a skill.
+        trace: the number of characters of all texts in a trace.
+    """
+
+    seconds: float = 3600.0
+    calls: int = 1_000
+    ticks: int = 200_000
+    text: int = 10_000
+    trace: int = 1_000_000
 
 
 @dataclass(frozen=True)
 class SimulationSettings:
-    """How a suite simulates its worlds. The defaults are the settings of the paper's suite."""
+    """How a suite simulates its worlds. The defaults are the settings of the paper's suite.
 
-    # `lowercase` converts a program's string literals before the run, as the authors of the paper did.
+    Args:
+        literals: `lowercase` converts a program's string literals before the run, as the paper's authors did.
+        matching: how requests refer to the labels of a world; `Matching` explains the values.
+        people: whether people answer to any name, or only to their own, to a word for people and to no name.
+        words_for_people: regexes for words that mean any person.
+        words_for_yes: regexes for options that mean yes. If none matches, a single option without a no does.
+        words_for_no: regexes for options that mean no. An option that matches one never means yes.
+        events: whether events record the words of the request, or the name of the actual room or thing.
+            `as-happened` records no event for a drive to an unknown room.
+        limits: the resources that one run may use.
+        clock_starts: the time on the program's clock when a run starts.
+    """
+
     literals: Literal["lowercase", "as-written"] = "lowercase"
-    # How requests refer to the labels of a world; see the module `matching`.
     matching: Matching = "label-in-request"
-    # Whether people answer to any name, or only to their own, to a word for people and to no name at all.
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
-    words_for_people: tuple[str, ...] = ()  # regexes for words that mean any person
-    # Regexes for other words for yes and no in options. An option with a word for no never means yes. People
-    # who say yes choose an option that has neither, if there is only one.
+    words_for_people: tuple[str, ...] = ()
     words_for_yes: tuple[str, ...] = ()
     words_for_no: tuple[str, ...] = ()
-    # Whether events record the words of the request, or the name of the actual room or thing. `as-happened`
-    # records no event for a drive to an unknown room.
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: Limits = field(default_factory=Limits)
-    clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)  # clock time when a run starts
+    clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)
 
 
 PAPER_SETTINGS = SimulationSettings()
@@ -54,9 +68,9 @@ def choose(
 ) -> int | None:
     """Return the position of the option that an answer refers to, or None if there is none.
 
-    First, look for the answer in the options. If no option has it, look for yes or no in the settings' other
-    words. Any other answer means yes if it matches the question, and no otherwise. A number selects the
-    nearest option, counted from 1, or from the end if it is negative.
+    A text selects the first option that contains it. Yes and no can also be found by the settings' other
+    words. Any other text means yes if the question contains it, else no. A number counts options from 1, or
+    from the end if it is negative; if it is too large, it selects the nearest option.
     """
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1

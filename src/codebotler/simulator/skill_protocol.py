@@ -34,7 +34,7 @@ OVERRUN = 100  # requests after a limit, such as from `finally`, until the child
 
 
 class SkillProtocol:
-    """Answers the requests of one new child until its run ends."""
+    """Answers the requests of one new process, which runs one program, until the run ends."""
 
     def __init__(self, child: IsolatedProcess, code: bytes, robot: SkillPerformer) -> None:
         self.child, self.robot, self.limits = child, robot, robot.settings.limits
@@ -70,9 +70,9 @@ class SkillProtocol:
         return self.ledger.outcome_at_end(final or {})
 
     def talk(self) -> dict[str, object] | None:
-        """Answer requests, and return the child's last message about its end, or None if there is none."""
+        """Answer requests, and return the child's last message, about its end, or None if there is none."""
         if self.child.receive() is None:
-            raise LostProcessError("a child ended before it was isolated")
+            raise LostProcessError("the process of a run ended before it was isolated")
         overrun = 0
         while (message := self.child.receive()) is not None:
             if isinstance(message, dict):
@@ -83,7 +83,7 @@ class SkillProtocol:
                 case [str() as name, list() as values, int() | float() as now, int() as line]:
                     pass  # from a live program; only for display, since it may be false
                 case _:
-                    raise ProtocolError("a request is malformed")
+                    raise ProtocolError("a request is not valid")
             if self.robot.is_live:
                 self.robot.line = line if type(line) is int and 0 < line <= MAX_LINE else None
             self.child.send((*self._answer(name, values, now), self.robot.now))
@@ -111,12 +111,12 @@ class SkillProtocol:
             case "too-long", _:
                 self.ledger.limit = too_long(self.limits)
             case _:
-                raise ProtocolError("there is no skill with this name")
+                raise ProtocolError("a request names an unknown skill")
         return STOP
 
 
 def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
-    """Describe a robot's skills for a child, by name and parameters."""
+    """Return the name and the parameters of each of a robot's skills, as a program's process needs them."""
     return tuple(
         (skill.name, tuple((p.name, p.kind, p.type.choices, p.words) for p in skill.parameters))
         for skill in robot.skills.rows
@@ -143,11 +143,11 @@ def _option(value: object) -> Option:
         case [str(text), bool(is_text)]:
             return Option(text, is_text)
         case _:
-            raise ProtocolError("an option is malformed")
+            raise ProtocolError("an option is not valid")
 
 
 def named_arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]:
-    """Convert the arguments of an agent's call for the robot. Raise UserError if they do not fit."""
+    """Convert an agent's arguments, given by name, for the robot. Raise UserError if they do not fit."""
     if len(str(given)) > MAX_ARGUMENT_CHARACTERS:
         raise UserError(f"the arguments have more than {MAX_ARGUMENT_CHARACTERS:,} characters; shorten them")
     values = [compose(given.get(parameter.name)) for parameter in skill.parameters]
@@ -157,11 +157,11 @@ def named_arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]
     with suppress(ProtocolError):
         if {*given} == {parameter.name for parameter in skill.parameters}:
             return arguments_of(skill, values)
-    raise UserError(f"call it as {skill.signature}")
+    raise UserError(f"the arguments do not fit the skill; call it as {skill.signature}")
 
 
 def named_result(skill: Skill, arguments: Sequence[Argument], result: Result) -> Result:
-    """Return the result of an agent's call: the text of the chosen option, if it is a question."""
+    """Return a result as agents see it: for a question, the text of the chosen option, not its position."""
     asked = zip(skill.parameters, arguments, strict=True)
     options = next((one for parameter, one in asked if parameter.is_options), None)
     chosen = options[result] if isinstance(options, tuple) and isinstance(result, int) else result

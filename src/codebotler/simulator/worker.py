@@ -29,12 +29,12 @@ Job: TypeAlias = tuple[str, Sequence[NewRobot]]
 class Worker:
     """Owns the processes that run programs, one at a time.
 
-    Nearly all programs are tame: they leave nothing behind, so many of them share a child with copies of
-    their robots. Any other run, or one that a shared child cannot decide, gets its own child, and the engine
-    performs its skills. The fork server of these runs has the standard library, and starts when needed.
+    Nearly all programs are tame: they leave nothing behind, so many of them share a process that has copies
+    of their robots. All other runs, and those that such a process cannot finish, get their own process, and
+    the engine performs their skills. Only these can import modules of the standard library.
 
     Args:
-        one_process_per_run: no two runs share a child, so the fork server for single runs starts first.
+        one_process_per_run: whether each run gets its own process, even if its program is tame.
     """
 
     def __init__(self, *, one_process_per_run: bool = False) -> None:
@@ -50,7 +50,7 @@ class Worker:
             raise EngineError(f"the engine cannot start: {error}") from None
 
     def run(self, source: str, new_robot: NewRobot) -> Outcome:
-        """Run a program with a robot. If a process is lost, repeat the run with a new robot."""
+        """Run a program on a new robot. If a process is lost, repeat the run once with another new robot."""
         return self.run_all([(source, [new_robot])])[0][0]
 
     def run_all(self, jobs: Sequence[Job]) -> list[list[Outcome]]:
@@ -84,11 +84,11 @@ class Worker:
             raise EngineError(stopped) from None
 
     def compiles(self, source: str, robot: SkillPerformer) -> bool:
-        """Return whether a program compiles."""
+        """Return whether a program compiles with the robot's skills and settings."""
         return isinstance(_compile(source, robot), CompiledProgram)
 
     def stop(self) -> None:
-        """Kill all processes and any current run. Any thread may call this."""
+        """Kill all processes and the current run. Any thread may call this. Use the worker no more."""
         self._stopped = True
         for fork_server in list(self._fork_servers.values()):
             fork_server.kill()
@@ -102,7 +102,7 @@ class Worker:
     # --- several tame programs in one child
 
     def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
-        """Run the tame programs, and return their outcomes by job and robot number, if they are decided."""
+        """Run the tame programs. Return outcomes by (job, robot) positions, without undecided ones."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
             return known
@@ -158,7 +158,7 @@ class Worker:
 
     @contextmanager
     def one_child(self) -> Iterator[None]:
-        """Run all batches in this context in the same child. They must belong to one program."""
+        """Run all batches in this context in the same process. They must belong to one program."""
         self._keeps_child = True
         try:
             yield
@@ -183,7 +183,7 @@ class Worker:
     # --- one child per run
 
     def run_alone(self, source: str, new_robot: NewRobot) -> Outcome:
-        """Run a program. If a process is lost through no fault of the program, repeat with a new robot."""
+        """Run a program in its own process. If the process is lost, repeat the run once with a new robot."""
         _log(source, "started")
         try:
             outcome = self._try(source, new_robot)
@@ -197,7 +197,7 @@ class Worker:
         return outcome
 
     def run_on(self, source: str, robot: SimulatedRobot) -> Outcome:
-        """Run a program on a robot that cannot start again. Raise EngineError if a process is lost."""
+        """Run a program on this robot. Never repeat the run: raise EngineError if a process is lost."""
         robots = [robot]
 
         def only_robot() -> SimulatedRobot:

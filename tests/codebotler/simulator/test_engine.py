@@ -594,7 +594,7 @@ def test_suite_sets_the_limits() -> None:
     bodies = {
         "time.sleep(11)": "10 seconds of simulated time",
         "for i in range(4): say('a')": "3 skill calls",
-        "for i in range(60): pass": "50 turns of loops",
+        "for i in range(60): pass": "50 loop iterations and function calls",
         "say('abcdef')": "a text of more than 5 characters",
         "for i in range(3): say('abcde')": "texts of more than 12 characters in total",
     }

@@ -332,7 +332,7 @@ WORKS: dict[str, tuple[str, object]] = {
 T = Status.TIMEOUT
 P = Status.PYTHON_ERROR
 FORGED_MESSAGE = "the program wrote to the sandbox channel"
-TOO_MANY_TURNS = "200,000 turns of loops"
+TOO_MANY_TURNS = "200,000 loop iterations and function calls"
 TOO_DEEP = "the program is too large, or nested too deeply"
 SUPPRESSES_ERRORS = "from contextlib import suppress\nwith suppress(BaseException):\n    while 1: pass\n"
 FAILS: dict[str, tuple[str, object]] = {
@@ -498,7 +498,7 @@ FAILS: dict[str, tuple[str, object]] = {
     ),
     "deadlock": (
         task("import threading\nlock = threading.Lock()\nlock.acquire()\nlock.acquire()"),
-        (T, "TimeoutError", "it waits for something that can never happen"),
+        (T, "TimeoutError", "a wait for something that can never happen"),
     ),
     "allocates without end": (
         task("parts = []\nwhile True: parts.append(bytearray(10**7))"),

@@ -1,1 +1,1 @@
-"""Runs tame programs in batches: `process` runs them in a closed child, `replay` checks its transcripts."""
+"""Runs simple (tame) programs in batches: `process` runs them in a child, `replay` checks its transcripts."""

@@ -1,7 +1,7 @@
-"""Runs tame programs in a closed child, each in all its worlds, and sends a transcript of each run.
+"""Runs tame programs in a child process, each in all its worlds, and sends a transcript of each run.
 
-The child has its own copy of each robot and ledger, so programs never wait for the engine. The engine does
-not trust the transcripts: it replays each one on its own robot, which must give the same answers.
+`sandbox.tame` explains tame programs. The child has its own copy of each robot and ledger, so programs never
+wait for the engine. The engine replays each transcript on its own robot, which must give the same answers.
 """
 
 from __future__ import annotations
@@ -63,11 +63,9 @@ def main(*descriptors: str) -> None:
 
 
 def execute(run: TranscribedRun, rehearsal: Batch) -> NoReturn:
-    """Run the batches that the engine sends, and send back transcripts, until the engine hangs up.
-
-    A child is forked before it is needed, and first runs a rehearsal, because the kernel copies each page on
-    the first write to it, which takes longer than most batches.
-    """
+    """Run the batches that the engine sends, and send back transcripts, until the engine hangs up."""
+    # A child is forked before it is needed, and first runs a rehearsal, because the kernel copies each page
+    # on the first write to it, which takes longer than most batches.
     transcripts(run, rehearsal)
     while True:
         transcripts(run, receive(), send_frames)
@@ -78,7 +76,7 @@ def transcripts(
     batch: Batch,
     send: Callable[[list[bytes]], None] = len,  # type: ignore[assignment]  # a rehearsal sends nothing
 ) -> None:
-    """Run each program of a batch in all its worlds, and send the transcripts of each program."""
+    """Run each program of a batch in all its worlds, and pass the transcripts of each program to `send`."""
     skills, elsewhere, pickled, programs = batch
     if skills != run.skills:
         run.provide(skills)
@@ -92,7 +90,7 @@ def transcripts(
 
 
 class TranscribedRun(ProgramRun):
-    """Runs tame programs one after another, and records the skill calls of each."""
+    """Runs programs of a batch one after another in one process, and records the skill calls of each."""
 
     recursion_limit = BATCH_RECURSION_LIMIT
 
@@ -104,13 +102,13 @@ class TranscribedRun(ProgramRun):
         self.builtins = {**given, **self.counters(), "__import__": lambda *_: sys.modules["time"]}
 
     def provide(self, skills: SkillDescriptions) -> None:
-        """Provide programs with the skills, `time` and the builtins for tame programs."""
+        """Provide the names that programs have without an import: the skills, `time` and some builtins."""
         self.skills = skills
         self.provided = {name: self.skill(name, parameters) for name, parameters in skills}
         self.provided.update(time=sys.modules["time"], __builtins__=self.builtins)
 
     def transcript(self, code: CodeType, kind: str, arguments: tuple[Any, ...]) -> bytes:
-        """Run a program on a new robot, and return the transcript."""
+        """Run a program on a new robot `ROBOTS[kind](*arguments)`, and return its transcript as JSON."""
         self._reset(ROBOTS[kind](*arguments))
         sys.setrecursionlimit(BATCH_RECURSION_LIMIT)
         end = self.execute(code, run_parameters(self.ledger.robot))
@@ -128,7 +126,7 @@ class TranscribedRun(ProgramRun):
         self.refuel()
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Execute a skill on this process's copy of the robot."""
+        """Execute a skill on this process's copy of the robot (or ask the engine). Return its result."""
         given = [
             _robot_argument(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)
         ]
@@ -159,12 +157,12 @@ class TranscribedRun(ProgramRun):
             raise LimitReachedError
 
     def request(self, request: str) -> NoReturn:  # noqa: ARG002 - as in ProgramRun
-        """End the run because its time is up."""
+        """End the run. The only request of a tame program says that its simulated time is up."""
         self._let_time_pass()
         raise LimitReachedError
 
     def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
-        """Return a function for each `except` that notices a caught RecursionError or MemoryError."""
+        """Return a function for each `except`: it marks runs that catch a recursion or memory error."""
 
         def caught() -> None:
             error = sys.exc_info()[0]
@@ -175,7 +173,7 @@ class TranscribedRun(ProgramRun):
         return caught
 
     def ended_by(self, error: BaseException) -> str:
-        """Describe the error that ended the program. A recursion or memory error makes the run undecided."""
+        """Return the program's end as JSON. After a recursion or memory error, the run must be repeated."""
         try:
             str(error)
         except (RecursionError, MemoryError):

@@ -19,7 +19,7 @@ from codebotler.simulator.skill_protocol import SkillDescriptions, describe_skil
 from codebotler.simulator.worlds.robot import Argument, Setup, SimulatedRobot
 
 Programs: TypeAlias = Sequence[tuple[bytes, Sequence[SimulatedRobot]]]
-"""Each program's code, with one robot for each run."""
+"""Each program's code, with one robot for each run. All robots have the same skills."""
 
 
 class Call(NamedTuple):
@@ -50,7 +50,7 @@ TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 def message(
     programs: Programs,
 ) -> tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
-    """Return the message that sends programs to a child. All their robots must have the same skills."""
+    """Return the message for a child: skills, own skills, pickled robots, each program's robot numbers."""
     robot = programs[0][1][0]
     setups: dict[tuple[int, ...], Setup] = {}
     keyed = []
@@ -90,7 +90,7 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
         if transcript.end is not None:
             outcome = judge_end(replay.ledger.outcome_at_end(transcript.end), robot)
             if outcome.status is Status.KILLED:
-                raise ProtocolError("the end of a run is malformed")
+                raise ProtocolError("the end of a transcript is not valid")
             if key is not None:
                 if len(REPLAYED) >= MAX_REPLAYS:
                     REPLAYED.clear()
@@ -104,23 +104,23 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
 def _frame(child: IsolatedProcess) -> bytes:
     frame = child.receive_bytes(MAX_FRAME)
     if frame is None:
-        raise LostProcessError("a child ended during a batch")
+        raise LostProcessError("the process of a batch ended too early")
     return frame
 
 
 def key_of(frame: bytes, robot: SimulatedRobot) -> ReplayKey | None:
-    """Return the cache key of a transcript, or None if it is too long or its robot is not a plain copy."""
+    """Return the cache key of a robot's transcript, or None if its replay must not be cached."""
     if len(frame) > MAX_REPLAY_BYTES or robot.setup[0] != "simulated" or robot.own_skills or robot.guard:
         return None
     return frame, id(robot.skills), *map(id, robot.setup[1])
 
 
 def parse_transcript(frame: bytes) -> Transcript | None:
-    """Parse a transcript, or return None if the run must be repeated in its own process."""
+    """Parse a transcript, or return None if the child asks to repeat the run in its own process."""
     try:
         return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # the decoder returns this type
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        raise ProtocolError("a transcript is malformed") from None
+        raise ProtocolError("a transcript is not valid") from None
 
 
 class Replay:
@@ -131,31 +131,31 @@ class Replay:
         self._own = robot.own_skills
 
     def follow(self, transcript: Transcript) -> SkillAnswer:
-        """Repeat all calls, and return the last answer. Raise ProtocolError if any answer differs."""
+        """Repeat all calls, and return the robot's last answer. Raise ProtocolError if any answer differs."""
         calls = [self._expected(call) for call in transcript.calls]
         if transcript.end is None and (not calls or calls[-1][-1] is not None):
-            raise ProtocolError("the child is waiting, but has asked for nothing")
+            raise ProtocolError("the child is waiting for an answer, but has asked for nothing")
         ledger = self.ledger
         answer: SkillAnswer = ("ok", None)
         for skill, arguments, now, expected in calls:
             if now != self.robot.now:
                 self._let_time_pass(now)
             if ledger.limit is not None:
-                raise ProtocolError("the program continues beyond a limit")
+                raise ProtocolError("a transcript continues after a limit was reached")
             answer = ledger.perform(skill, arguments)
             if ledger.broken is not None:
                 return answer
             if expected is not None and expected != (
                 answer if answer[0] != "error" else ("error", answer[1][1:])
             ):
-                raise ProtocolError("the robot gives a different answer")
+                raise ProtocolError("a transcript and the robot give different answers")
         if transcript.end is not None:
             self._let_time_pass(transcript.now)
         return answer
 
     def _let_time_pass(self, now: float) -> None:
         if now < self.robot.now:
-            raise ProtocolError("time runs backwards")
+            raise ProtocolError("a transcript reports an earlier time than before")
         if self.ledger.limit is None:
             self.ledger.let_time_pass(now)
 
@@ -164,9 +164,9 @@ class Replay:
         skill = self.robot.skills.get(call.skill)
         known = () if skill is None else skill.parameters
         if skill is None or len(known) != len(call.arguments) or not all(map(_fits, known, call.arguments)):
-            raise ProtocolError("there is no skill with this name and these parameters")
+            raise ProtocolError("a transcript calls an unknown skill, or one with wrong arguments")
         if call.kind == "ask" and call.skill not in self._own:
-            raise ProtocolError("the child could have answered this call itself")
+            raise ProtocolError("the child has asked for a skill that it can perform itself")
         value = tuple(call.value) if call.kind == "error" and isinstance(call.value, list) else call.value
         arguments: Any = call.arguments  # checked above
         return call.skill, arguments, call.now, None if call.kind == "ask" else (call.kind, value)

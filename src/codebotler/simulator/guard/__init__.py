@@ -1,1 +1,1 @@
-"""House rules and contracts, and the guard that holds each skill call against them."""
+"""House rules and contracts, and the guard that checks each skill call against them."""

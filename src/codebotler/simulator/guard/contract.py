@@ -1,4 +1,4 @@
-"""`Contract`: what a program may do at most. A person reads and approves it before the program runs."""
+"""`Contract`: the most that a program may do. A person approves it before the program runs."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from codebotler.simulator.guard.house_rule import UNKNOWN_ROOM, Rule, RuleViolat
 from codebotler.simulator.worlds.robot import Argument
 
 CONTRACT = Rule("approved contract", "Do only what the contract allows", And(()))
-"""The rule under which messages report a broken contract. No name of a house rule has a space."""
+"""The rule that error messages name if a call breaks a contract. Names of house rules have no spaces."""
 
 TELLING_SKILLS = frozenset({"get_all_rooms", "get_current_location"})
-"""Skills that only return names of rooms. Every contract allows them."""
+"""The skills that only return names of rooms. Every contract allows them."""
 
 KINDS_WITH_PLACE = {PICK, PLACE}
 
@@ -33,7 +33,7 @@ class RequestedCall:
 
     Args:
         skill: the name of the skill.
-        texts: the texts of each argument; for the goal of a drive, the names of the rooms that it may mean.
+        texts: for each argument, its texts (several for a list); for a drive, the rooms that it may mean.
         place: the robot's room; "" if it is unknown.
     """
 
@@ -43,7 +43,7 @@ class RequestedCall:
 
     @classmethod
     def of(cls, row: Skill, arguments: Sequence[Argument], rooms: Sequence[str], place: str) -> RequestedCall:
-        """Describe a call of a skill. If it is a drive, `rooms` replace the text of its goal."""
+        """Return the call of a skill with these arguments. For a drive, `rooms` replace the goal's text."""
         texts = []
         for parameter, value in zip(row.parameters, arguments, strict=True):
             if is_goal(row, parameter.name) and rooms:
@@ -58,12 +58,12 @@ class RequestedCall:
 
 
 def is_goal(row: Skill, parameter: str) -> bool:
-    """Return whether a parameter names the room that the robot drives to."""
+    """Return whether a skill is a drive, and this parameter is the room to drive to."""
     return row.is_drive and row.recording is not None and row.recording.text == parameter
 
 
 def has_place(row: Skill) -> bool:
-    """Return whether a contract limits the rooms where a skill may be called, as for `pick` and `place`."""
+    """Return whether a contract limits in which rooms a skill may be called, as for `pick` and `place`."""
     return row.recording is not None and row.recording.kind in KINDS_WITH_PLACE
 
 
@@ -72,8 +72,8 @@ class SkillBound:
     """The limits within which a program may call one skill.
 
     Args:
-        texts: the allowed texts of each argument, by the parameter's name.
-        places: the rooms in which it may be called; None for any.
+        texts: for each parameter, its name and templates of the texts that it may have.
+        places: the rooms in which the skill may be called; None for any.
         at_most: how many successful calls one run may make; None for any number.
     """
 
@@ -82,7 +82,7 @@ class SkillBound:
     at_most: int | None = None
 
     def objection(self, call: RequestedCall) -> str:
-        """Return why a call is not allowed: `since its obj may be "mug", and not "pen"`; empty if it is."""
+        """Return the reason against a call: `since its obj may be "mug", and not "pen"`; "" if allowed."""
         for (name, allowed), texts in zip(self.texts, call.texts, strict=True):
             for text in texts:
                 if not any(template.matches(text) for template in allowed):
@@ -94,9 +94,9 @@ class SkillBound:
         return f'since it may happen in {_some(self.places)}, and not in "{brief(call.place)}"'
 
     def beyond(self, other: SkillBound) -> SkillBound | None:
-        """Return what this bound allows and the other one forbids, or None if the other one allows it all.
+        """Return the part of this bound that the other bound forbids, or None if it forbids nothing.
 
-        If several limits are wider than those of the other bound, return this whole bound.
+        If this bound is wider in several ways, such as more rooms and more calls, return all of it.
         """
         added: list[tuple[str, Templates]] = []
         for (name, templates), (_, allowed) in zip(self.texts, other.texts, strict=True):
@@ -125,11 +125,9 @@ class Contract:
     skills: Mapping[str, SkillBound]
 
     def objection(self, call: RequestedCall, earlier: int = 0) -> str:
-        """Return why a call is not allowed, such as "since ask may not be called"; empty if it is.
+        """Return the reason against a call, such as "since ask may not be called"; "" if it is allowed.
 
-        Args:
-            call: the call.
-            earlier: how many calls of this skill the run has made before.
+        `earlier` is how many calls of this skill have succeeded before in the run.
         """
         bound = self.skills.get(call.skill)
         if call.skill in TELLING_SKILLS:
@@ -141,7 +139,7 @@ class Contract:
         return bound.objection(call)
 
     def beyond(self, other: Contract) -> Contract:
-        """Return what this contract allows and the other one forbids."""
+        """Return a contract with only what this one allows and the other one forbids."""
         new = {
             name: bound if name not in other.skills else bound.beyond(other.skills[name])
             for name, bound in self.skills.items()
@@ -151,7 +149,7 @@ class Contract:
 
 
 def contract_violation(row: Skill, arguments: Sequence[Argument], place: str, why: str) -> RuleViolationError:
-    """Return the error for a call that a contract does not allow."""
+    """Return the error for a call that a contract forbids. `why` is from `Contract.objection`."""
     event = attempted_event(row, arguments, place=place, time=0.0)
     return RuleViolationError(CONTRACT, event or Event(row.name, ""), "forbids", why)
 

@@ -57,15 +57,15 @@ class Rule:
 
     @property
     def names_destination(self) -> bool:
-        """Whether the rule is about drives to some rooms, rather than about all drives or none."""
+        """Whether the rule mentions drives to particular rooms, such as the kitchen, not just any drive."""
         return any(one.kind == GOTO and one.text != Regex(".*") for one in self.elements)
 
     def depends_on_room(self, event: Event) -> bool:
-        """Return whether the rule depends on the room in which events of this kind happen."""
+        """Return whether it matters to the rule in which room an event of this kind happens."""
         return any(one.place is not None for one in self.elements if one.kind == event.kind)
 
     def results(self, attempt: Event) -> Sequence[Event]:
-        """Return the event with each of its possible results, or unchanged if the rule ignores results."""
+        """Return the event with each possible `found` or `answer`, or unchanged if the rule ignores them."""
         compared = [one for one in self.elements if one.kind == attempt.kind]
         if any(one.found is not None for one in compared):
             return [replace(attempt, found=True), replace(attempt, found=False)]
@@ -74,7 +74,7 @@ class Rule:
         return (attempt,)
 
     def tells_apart(self, events: Iterable[Event]) -> bool:
-        """Return whether the rule distinguishes between some of the events."""
+        """Return whether some pattern of the rule matches some of these events but not all."""
         events = tuple(events)
         return any(len({is_match(one, event, 0) for event in events}) > 1 for one in self.elements)
 
@@ -84,9 +84,9 @@ class RuleViolationError(RobotError):
 
     Args:
         rule: the rule in question.
-        event: the event that breaks the rule, or None at the end of a mission.
+        event: the event that breaks the rule, or None if the rule is broken at the end of a mission.
         objection: how the event conflicts with the rule.
-        why: the reason why the rule cannot be judged, as the end of a sentence.
+        why: the reason why the rule cannot be judged, as the end of a sentence: "since ...".
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class RuleViolationError(RobotError):
 
     @property
     def is_late(self) -> bool:
-        """Whether the event has already happened."""
+        """Whether the event has already happened, so that the guard could not prevent it."""
         return self.objection in {"is broken by", "could not judge"}
 
     @property

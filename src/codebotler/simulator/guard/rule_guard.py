@@ -27,18 +27,18 @@ KINDS_OF_MOVES = {PICK, PLACE}
 
 
 def name_of(label: str, request: str) -> str:
-    """Return the name that rules compare for a room or thing: its label, or the request for a regex."""
+    """Return a room's or thing's name in rules: its label, or the program's request if that is a regex."""
     is_name = PLAIN_LABEL.fullmatch(label) or not request or label.casefold() in request.casefold()
     return label if is_name else request
 
 
 def rooms_meant(robot: SimulatedRobot, request: str) -> list[str]:
-    """Return all rooms that a drive to the request may lead to, by the names that rules compare."""
+    """Return all rooms to which a drive with this request may lead, by the names that rules use."""
     return [name_of(robot.full_names.get(room, room), request) for room in robot.possible_rooms(request)]
 
 
 def goals_of_call(robot: SimulatedRobot, row: Skill, arguments: Sequence[Argument]) -> list[str]:
-    """Return the rooms that a call may drive to, by the names that rules compare; none if it is no drive."""
+    """Return the rooms to which a call may drive, by the names that rules use; empty if it is no drive."""
     goals = (
         one for parameter, one in zip(row.parameters, arguments, strict=True) if is_goal(row, parameter.name)
     )
@@ -145,11 +145,9 @@ class RuleGuard:
             self._history = history
 
     def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
-        """Raise RuleViolationError if the next event inside one of the user's own skills would break a rule.
-
-        Events inside a skill are provisional: the skill's own event may come before them, but its result is
-        not known until the call ends.
-        """
+        """Raise RuleViolationError if the next event inside a user's own skill would break a rule."""
+        # Events inside a skill are provisional: the skill's own event may come before them, but its result is
+        # not known until the call ends.
         if not self._is_own:
             return
         earlier, self._seen = robot.events[self._seen :], len(robot.events)
@@ -165,11 +163,7 @@ class RuleGuard:
     def judge_call(self, row: Skill, arguments: Sequence[Argument], goals: Sequence[str], place: str) -> None:
         """Count the next call, or raise RuleViolationError if a contract does not allow it.
 
-        Args:
-            row: the skill.
-            arguments: its arguments.
-            goals: the rooms that the goal of a drive may mean, as rules name them.
-            place: the robot's room, or "" if it is unknown.
+        `goals` is from `goals_of_call`. `place` is the robot's room, or "" if it is unknown.
         """
         for contract in self.contracts:
             call = RequestedCall.of(row, arguments, goals, place)
@@ -178,17 +172,17 @@ class RuleGuard:
         self._calls[row.name] += 1
 
     def uncount_call(self, row: Skill) -> None:
-        """Take back the count of a skill's last call, since it failed and the program may try again."""
+        """Do not count a skill's last call, since it failed. Contracts limit only successful calls."""
         self._calls[row.name] -= 1
 
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
-        """Raise RuleViolationError if one of `attempts`, the possible next events, would break a rule."""
+        """Raise RuleViolationError if a possible next event (all are drives if `is_drive`) breaks a rule."""
         found = list(self.find_violations(attempts, is_drive=is_drive))
         if found:
             raise min(found, key=lambda broken: not broken.ends_run)  # another rule may end the run
 
     def find_violations(self, attempts: Sequence[Event], *, is_drive: bool) -> Iterator[RuleViolationError]:
-        """Yield an error for each pair of a rule and a possible next event that would break the rule."""
+        """Yield an error for each rule and each possible next event (drives if `is_drive`) that breaks it."""
         attempts = tuple(map(_trimmed, attempts))
         leaves = is_drive and any(map(self._leaves, attempts[1:] or attempts))
         for rule, monitor in self._history.monitors:
@@ -207,12 +201,12 @@ class RuleGuard:
         return goal.casefold() != place.casefold()
 
     def happened(self, event: Event) -> None:
-        """Add an event to the history. Raise RuleViolationError if its result broke a rule."""
+        """Add a completed event to the history. Raise RuleViolationError if its result broke a rule."""
         if broken := self.add_event(event):
             raise broken[0]
 
     def add_event(self, event: Event) -> list[RuleViolationError]:
-        """Add an event to the history, and return an error for each rule that its result broke."""
+        """Add a completed event to the history, and return an error for each rule that its result broke."""
         if event.destination is not None:
             self._history.names[event.destination] = event.text
         elif event.kind in KINDS_OF_MOVES:
@@ -232,13 +226,13 @@ class RuleGuard:
         return late
 
     def moved(self, start: Point, end: Point, holding: str) -> None:
-        """Add the rooms that a straight drive enters. Raise RuleViolationError if that broke a rule."""
+        """Record which rooms a straight drive has entered. Raise RuleViolationError if that broke a rule."""
         if self.judges_poses:
             for event in self._entered(rooms_along(self._rooms, start, end), holding):
                 self.happened(event)
 
     def give_up(self, rules: Iterable[Rule], event: Event, objection: Objection, why: str) -> None:
-        """Stop judging some rules. Raise RuleViolationError if one of them must always hold."""
+        """Stop judging some rules. Raise RuleViolationError for the first of them that must always hold."""
         for rule in rules:
             self._history.unjudged.add(rule.name)
             if rule.when == "always":

@@ -54,7 +54,7 @@ def compile_program(source: str, literals: str, skills: tuple[str, ...]) -> Comp
 def compile_programs(
     sources: Sequence[str], literals: str, skills: tuple[str, ...]
 ) -> list[CompiledProgram | Outcome]:
-    """Compile several programs as `compile_program` does, with a single call if they are short."""
+    """Compile several programs as `compile_program` does, all in a single call if they are short."""
     if len(sources) > 1 and sum(map(len, sources)) <= LONG_SOURCE:
         try:
             return [result_of(*each) for each in _compile_all(sources, literals, skills)]
@@ -64,7 +64,7 @@ def compile_programs(
 
 
 def result_of(kind: str, text: str, further: Any) -> CompiledProgram | Outcome:  # noqa: ANN401 - from JSON
-    """Convert a result of `compile_here` to the program, or to the outcome of all runs if it is an error."""
+    """Convert a result of `compile_here` to a program, or an error to the outcome of all runs."""
     if kind == CODE:
         return CompiledProgram(b64decode(text), further)
     return Outcome(Status.PYTHON_ERROR, (), RunError(kind, text), further)
@@ -81,7 +81,7 @@ def _compile_all(
 
 
 def compile_here(source: str, literals: str, skills: frozenset[str]) -> tuple[str, str, int | None]:
-    """Compile a program in this process. For untrusted text, do this only in a closed one.
+    """Compile a program in this process, which must be a closed process if the text is untrusted.
 
     Returns:
         CODE, the code in base64 and whether it is tame, or an error's kind, message and line.

@@ -11,7 +11,7 @@ PROCESSOR_TIME = "seconds of processor time"  # ends the message about a program
 
 
 class EngineError(RuntimeError):
-    """The engine itself failed, through no fault of a program."""
+    """The engine that runs programs failed, through no fault of a program."""
 
 
 class LostProcessError(Exception):
@@ -19,11 +19,11 @@ class LostProcessError(Exception):
 
 
 class ProtocolError(Exception):
-    """The program must have written to the channel, since our own code never sends this message."""
+    """A process sent an invalid message, which our code never does, so the program must have sent it."""
 
 
 def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, RunError]:
-    """Explain why a process died without a last message, from its exit status or negative signal number."""
+    """Return a run's status and error, from its process's exit status or signal and processor time limit."""
     match -status:
         case signal.SIGXCPU:
             return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")

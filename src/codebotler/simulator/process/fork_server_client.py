@@ -34,7 +34,7 @@ WARM_UP_RUNS = 20  # the interpreter specializes code that has run a few times
 
 
 class ForkServer:
-    """Starts a fork server, and has it fork children one at a time."""
+    """Starts a fork server: a process that forks an isolated child for each run, one at a time."""
 
     def __init__(self) -> None:
         ours, report = os.pipe()
@@ -55,7 +55,7 @@ class ForkServer:
             self._set_up()
         except (LostProcessError, OSError):
             self.close()
-            raise LostProcessError("the fork server did not start") from None
+            raise LostProcessError("the fork server did not start; the machine may lack memory") from None
         except BaseException:  # such as an interrupt
             self.close()
             raise
@@ -64,7 +64,7 @@ class ForkServer:
         return start_fork_server(*descriptors)
 
     def fork(self, *, is_live: bool = False) -> IsolatedProcess:
-        """Return a newly forked child, which may use more processor time if its run is live."""
+        """Fork a child. If `is_live`, its program uses a live robot, and may take more processor time."""
         ours, theirs = channel_pair()
         try:
             with theirs:
@@ -119,7 +119,7 @@ class ForkServer:
 
 
 class BatchServer(ForkServer):
-    """Starts a fork server for batches of tame programs, and has it fork children in advance."""
+    """Starts a fork server that forks children for batches of tame programs, each in advance."""
 
     def __init__(self) -> None:
         self._next: IsolatedProcess | None = None
@@ -129,7 +129,7 @@ class BatchServer(ForkServer):
         return start_module(BATCH_CODE, (), descriptors)
 
     def fork(self, *, is_live: bool = False) -> IsolatedProcess:
-        """Return a new child, which may have been forked in advance. No batch is live."""
+        """Return the child that was forked in advance, or else a new one. No batch is live."""
         child, self._next = self._next, None
         if child is not None and self.has_ended:  # another process may have the child's id now
             child.hang_up()
@@ -137,7 +137,7 @@ class BatchServer(ForkServer):
         return child or super().fork(is_live=is_live)
 
     def fork_ahead(self) -> None:
-        """Fork the next child in advance. The previous child must have been killed."""
+        """Fork the next child in advance. Call this only after the previous child was killed."""
         with contextlib.suppress(LostProcessError):  # the next fork raises the error
             self._next = super().fork()
 

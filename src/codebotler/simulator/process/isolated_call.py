@@ -91,10 +91,8 @@ def isolated(
 ) -> Callable[[Callable[_Arguments, _Result]], IsolatedFunction[_Arguments, _Result]]:
     """Make a module's function run in a closed process.
 
-    Its arguments are pickled, and its result is returned as JSON, in which tuples become lists.
-
-    Args:
-        rehearsal: arguments for a first call of the function, made in each new process before it is closed.
+    The function's arguments are pickled, and its result is returned as JSON, in which tuples become lists.
+    Each new process first makes a call with the arguments `rehearsal`, before it is closed.
     """
     return lambda function: IsolatedFunction(function, rehearsal)
 
@@ -112,19 +110,19 @@ class ClosedProcess:
             raise LostProcessError("a closed process did not start")
 
     def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - a function may return any type
-        """Call a function in the process, and return its result."""
+        """Call a function by its name, with pickled (args, kwargs), in the process. Return its result."""
         self._channel.send((name, arguments))
         try:
             answer = self._channel.receive_bytes(len(RESULT) + MAX_RESULT)
         except TimeoutError:  # our own functions never wait, so the machine is to blame
-            raise LostProcessError("it did not answer") from None
+            raise LostProcessError("the process did not answer in time") from None
         except ProtocolError as error:
             raise IsolatedCallError("MemoryError", f"the result is too large: {error}") from None
         self._channel.reset_patience()
         if not answer:
             status = self._channel.end_gently()
             if status == -signal.SIGKILL:
-                raise LostProcessError("it was killed from outside")
+                raise LostProcessError("the process was killed from outside; the machine may lack memory")
             _, fault = cause_of_death(status)
             raise IsolatedCallError(fault.kind, fault.message)
         data = json.loads(answer[1:])
@@ -156,7 +154,7 @@ os.register_at_fork(after_in_child=IDLE_PROCESSES.clear)
 
 
 def serve(module: str, descriptor: str) -> NoReturn:
-    """Call the functions that the engine asks for until it hangs up."""
+    """Call functions of a module for the engine, until the engine closes the channel `descriptor`."""
     import unicodedata as _  # noqa: F401, PLC0415 - needed to parse "\N{...}", and cannot be imported later
 
     forget_the_shell()

@@ -24,7 +24,7 @@ WHOLE_MESSAGE = 2**31 - 1  # bytes, more than any message has
 
 
 class IsolatedProcess:
-    """The engine's handle on one isolated process."""
+    """Exchanges messages with one isolated process, and can kill it."""
 
     def __init__(
         self,
@@ -41,7 +41,7 @@ class IsolatedProcess:
 
     @cached_property
     def pid(self) -> int:
-        """The process id. Raises LostProcessError if there is none."""
+        """The process id. Reading it raises LostProcessError if the process did not start."""
         try:
             return self._find_pid()
         except LostProcessError:
@@ -49,7 +49,7 @@ class IsolatedProcess:
             raise
 
     def send(self, message: object) -> None:
-        """Send a message. If the process has ended, only `receive` reports it."""
+        """Send a message. If the process has ended, nothing happens; only `receive` reports that."""
         data = marshal.dumps(message, WITHOUT_REFERENCES)  # type: ignore[arg-type]  # strings, numbers and containers of them
         rest = memoryview(len(data).to_bytes(HEADER, "big") + data)
         used: int | None = None
@@ -76,17 +76,17 @@ class IsolatedProcess:
         except (ValueError, RecursionError):
             message, end = None, 0
         if message is None or end < len(frame):
-            raise ProtocolError("a frame does not contain a message")
+            raise ProtocolError("a message is not valid JSON")
         return message
 
     def receive_bytes(self, most: int) -> bytes | None:
-        """Return the next frame, of at most `most` bytes, or None if the process has hung up."""
+        """Return the next message as bytes, at most `most` of them, or None if the process has hung up."""
         used: int | None = None
         while True:
             if len(self._buffer) >= HEADER:
                 end = HEADER + int.from_bytes(self._buffer[:HEADER], "big")
                 if end - HEADER > most:
-                    raise ProtocolError("a frame is too long")
+                    raise ProtocolError(f"a message has more than {most:,} bytes")
                 if len(self._buffer) >= end:
                     frame = bytes(self._buffer[HEADER:end])
                     del self._buffer[:end]
@@ -131,7 +131,7 @@ class IsolatedProcess:
             self.hang_up()
 
     def end_gently(self) -> int:
-        """Kill the process unless it exits soon, and return its exit status or negative signal number."""
+        """Kill the process if it does not exit within 0.1 seconds. Return what `end` returns."""
         for _ in range(50):
             if _stat(self.pid)[:1] in ([], ["Z"]):
                 break
@@ -139,19 +139,19 @@ class IsolatedProcess:
         return self.end()
 
     def reset_patience(self) -> None:
-        """Restart the wait limit, after an answer."""
+        """Allow the full waiting time again, after an answer."""
         self.patience = PROCESS_WAIT_SECONDS
 
     def hang_up(self) -> None:
-        """Close the channel."""
+        """Close the channel to the process."""
         self._channel.close()
 
 
 def channel_pair() -> tuple[socket.socket, socket.socket]:
-    """Return both ends of a channel, of which the second is for the process.
+    """Return the two ends of a new channel: ours, and the one for the process.
 
     On Linux, each `read` of the process returns as many bytes as it asks for, however fast we send them. The
-    sizes of what it reads change its heap, which wild programs can observe.
+    sizes of what it reads change its heap, which programs can observe.
     """
     ours, theirs = socket.socketpair()
     CHANNELS.add(ours)

@@ -38,13 +38,13 @@ CHILD_ENVIRONMENT = {
 
 
 def start_fork_server(*descriptors: int) -> subprocess.Popen[bytes]:
-    """Start a fork server with fixed addresses, and pass it descriptors and the code of its modules."""
+    """Start a fork server with fixed memory addresses, these descriptors, and the code of its modules."""
     handed = (*descriptors, compiled_file().fileno())
     return _start([str(SANDBOX / "start.py"), *map(str, handed)], handed)
 
 
 def start_module(code: str, arguments: Sequence[str], descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
-    """Run a line of our code in a new process, and pass it descriptors. The code can import our modules."""
+    """Run a line of our code in a new process that can import our modules, with arguments and descriptors."""
     folders = [os.path.abspath(folder) for folder in sys.path]  # noqa: PTH100 - Path.resolve follows links
     setup = f"import sys; sys.path[:] = {folders!r}; {code}"
     return _start(["-c", setup, *arguments, *map(str, descriptors)], descriptors)
@@ -86,7 +86,7 @@ os.register_at_fork(after_in_child=leave_to_parent)
 
 
 def compiled_file() -> IO[bytes]:
-    """Return a file with the code of all modules of a fork server."""
+    """Return an open file with the compiled code of all modules of a fork server."""
     with START_LOCK:
         return _written_file()
 
@@ -102,7 +102,8 @@ def _written_file() -> IO[bytes]:
         file.write(codes)
         file.flush()
     except OSError as error:  # the file size limit applies to files in memory as well
-        raise LostProcessError(f"{error.strerror}; allow larger files with `ulimit -f unlimited`") from None
+        hint = "allow larger files with `ulimit -f unlimited`"
+        raise LostProcessError(f"our code cannot be stored ({error.strerror}); {hint}") from None
     return file
 
 
@@ -110,7 +111,7 @@ def _written_file() -> IO[bytes]:
 
 
 def compiled_modules(compiler: Callable[[str, str], bytes]) -> bytes:
-    """Return the code of all modules of a fork server, by name, as one marshalled message."""
+    """Return the code of all modules of a fork server as a marshalled dict. `compiler` is like `code_of`."""
     package = f"{SIMULATOR}.sandbox"
     files = {package: str(SANDBOX / "__init__.py")}
     files |= {f"{package}.{path.stem}": str(path) for path in sorted(SANDBOX.glob("[a-z]*.py"))}
@@ -122,7 +123,7 @@ def compiled_modules(compiler: Callable[[str, str], bytes]) -> bytes:
 
 
 def stdlib_files() -> dict[str, Path]:
-    """Find the files of the standard library modules that programs can import, and of their submodules."""
+    """Return the file of each standard library module, by name, that programs can import."""
     folder, files = Path(os.__file__).parent, {}
     for name in IMPORTED:
         path = folder.joinpath(*name.split("."))
@@ -136,7 +137,7 @@ def stdlib_files() -> dict[str, Path]:
 
 
 def code_of(file: str, shown: str) -> bytes:
-    """Return a module's code, whatever the interpreter's options. Tracebacks show the file name `shown`."""
+    """Return a Python file's marshalled code, whatever our Python's options. Tracebacks call it `shown`."""
     code = None
     if not sys.flags.optimize:
         with contextlib.suppress(EOFError, ImportError, ValueError):  # the bytecode file is damaged

@@ -23,14 +23,14 @@ TOO_LONG_REQUEST = '["too-long",[],0.0]'
 
 
 def send(text: str) -> None:
-    """Write one frame of JSON text, which must be ASCII."""
+    """Send one message of JSON in ASCII. If it is too long, send a request that ends the run instead."""
     if len(text) > MAX_FRAME:
         text = TOO_LONG_REQUEST
     send_frames([text.encode("ascii")])
 
 
 def send_frames(frames: list[bytes]) -> None:
-    """Write several frames at once."""
+    """Send several messages at once, each after its length."""
     data = b"".join([len(frame).to_bytes(HEADER, "big") + frame for frame in frames])
     written = write(CHANNEL, data)
     while written < len(data):
@@ -39,7 +39,7 @@ def send_frames(frames: list[bytes]) -> None:
 
 
 def receive() -> Any:  # noqa: ANN401 - any message from the engine
-    """Read one message."""
+    """Return the engine's next message. Exit the process if the engine has ended."""
     missing = int.from_bytes(_read(HEADER), "big")
     pieces = []
     while missing > 0:  # more than once on macOS only; see `channel_pair`

@@ -21,7 +21,7 @@ class StandIn(type):
 
 
 class date(real.date, metaclass=StandIn):  # noqa: N801 - the name of the original
-    """Replaces `datetime.date`."""
+    """Replaces `datetime.date`. Its `today` uses the simulated clock."""
 
     @classmethod
     def today(cls) -> date:
@@ -33,7 +33,7 @@ class date(real.date, metaclass=StandIn):  # noqa: N801 - the name of the origin
 
 
 class datetime(real.datetime, metaclass=StandIn):  # noqa: N801 - the name of the original
-    """Replaces `datetime.datetime`."""
+    """Replaces `datetime.datetime`. Its `now` and `today` use the simulated clock."""
 
     @classmethod
     def now(cls, tz: real.tzinfo | None = None) -> datetime:
@@ -56,7 +56,7 @@ class datetime(real.datetime, metaclass=StandIn):  # noqa: N801 - the name of th
 
 
 def simulate_dates() -> None:
-    """Install the replacements in `datetime`."""
+    """Replace `date` and `datetime` in the module `datetime` by the classes of this module."""
     for fake in (date, datetime):
         fake.__module__, fake.__qualname__ = "datetime", fake.__name__
         setattr(real, fake.__name__, fake)

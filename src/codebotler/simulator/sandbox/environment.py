@@ -91,18 +91,16 @@ def simulate_time(run: ProgramRun) -> None:
 
 
 class Lock:
-    """Replaces `_thread.lock`. No other thread could release it, so a wait only passes simulated time.
+    """Replaces `_thread.lock`. No other thread could release it, so a wait only passes simulated time."""
 
-    An `RLock` needs no replacement, since the only thread never waits for it.
-    """
-
+    # An `RLock` needs no replacement, since the only thread never waits for it.
     run: ProgramRun
 
     def __init__(self) -> None:
         self._is_held = False
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:  # noqa: FBT001, FBT002 - as in _thread
-        """Take the lock if it is free. Otherwise, let the timeout pass, or end the run if there is none."""
+        """Take a free lock and return True. Else wait and return False, or without a timeout end the run."""
         if not blocking and timeout != -1:
             raise ValueError("can't specify a timeout for a non-blocking call")
         if not self._is_held:

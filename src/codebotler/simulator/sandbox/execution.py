@@ -80,7 +80,7 @@ class ProgramRun:
         return self.ended_by(LimitReachedError()) if self.spent else '{"end":"finished"}'
 
     def ended_by(self, error: BaseException) -> str:
-        """Describe the error that ended the program as JSON. Its class may be the program's own."""
+        """Return the program's end as JSON, from the error that ended it, whose class may be its own."""
         kind, line = type(error), self.refused_at or _last_line(error)
         message = str.__getitem__(_message_of(error), slice(1000))  # a subclass of `str` may use fuel
         where = f'"line":{"null" if line is None else line}'
@@ -114,7 +114,7 @@ class ProgramRun:
         }
 
     def enter(self) -> None:
-        """Record that the program has entered one of its module's functions."""
+        """Record that the program has entered one of the functions that it defines at its top level."""
         code = getframe(1).f_code
         self.codes.add(code)
         self.entered = self.entered or code.co_name == "task_program"
@@ -124,11 +124,11 @@ class ProgramRun:
         self.entered = True
 
     def has_entered(self, task: object) -> bool:
-        """Return whether the program has called its task itself, by any name."""
+        """Return whether the program itself has called `task_program`, the function `task`, by any name."""
         return self.entered or (type(task) is types.FunctionType and task.__code__ in self.codes)
 
     def is_unawaited(self, task: object) -> bool:
-        """Return whether the task is a coroutine that never started."""
+        """Return whether the function `task` is an `async def` that never started to run."""
         return (
             type(task) is types.FunctionType
             and task.__code__.co_flags & COROUTINE != 0
@@ -151,7 +151,7 @@ class ProgramRun:
         return use_fuel
 
     def refuel(self) -> None:
-        """Refill the fuel."""
+        """Reset the fuel that has been used to zero."""
         self.count = itertools.count(1).__next__
 
     def skill(self, name: str, parameters: tuple[ParameterDescription, ...]) -> object:
@@ -178,7 +178,7 @@ class ProgramRun:
     def perform(
         self, name: str, parameters: list[tuple[type | str, ParameterDescription]], values: tuple[Any, ...]
     ) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Execute a skill. Texts must be of type `str` and options of type `list`, not of subclasses."""
+        """Execute a skill. Raise TypeError or ValueError for a wrong argument, also a subclass of `str`."""
         for (kind, parameter), value in zip(parameters, values, strict=True):
             given: type = type(value)
             if given is not kind:
@@ -194,7 +194,7 @@ class ProgramRun:
         return result
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Ask the engine to execute a skill."""
+        """Ask the engine to execute a skill, and return its result."""
         kinds = self.kinds[name]
         given = [
             JSON_WRITERS.get(kind, _value_text)(value) for kind, value in zip(kinds, arguments, strict=True)
@@ -202,7 +202,7 @@ class ProgramRun:
         return self.request(f"{quoted(name)},[{','.join(given)}]")
 
     def sleep(self, seconds: object, /) -> None:
-        """Advance simulated time. The engine learns of it with the next request, or at the end."""
+        """Let `seconds` pass: on the simulated clock, or for a live robot on the real one."""
         if not isinstance(seconds, int | float):
             raise TypeError(f"{NAME_OF(type(seconds))!r} object cannot be interpreted as an integer")
         if not 0 <= seconds < float("inf"):
@@ -215,11 +215,11 @@ class ProgramRun:
             self.request('"sleep",[]')
 
     def wait_for_ever(self) -> None:
-        """End the run, since nothing else is running that could end the wait."""
+        """End the run, since a wait without a timeout would never end in a program with one thread."""
         self.request('"wait",[]')
 
     def request(self, request: str) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Send one request, and wait for its reply."""
+        """Send one request to the engine. Return the value of its reply, or raise the error in it."""
         if self.spent:
             raise LimitReachedError
         where = f",{_line_at_work()}" if self.is_live else ""
@@ -262,7 +262,7 @@ def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: ty
     if (given is int and not -MAX_EXACT_INT <= value <= MAX_EXACT_INT) or (
         given is float and value - value != 0
     ):
-        raise ValueError(f"{name}: {named} is out of range")
+        raise ValueError(f"{name}: {named} is out of range (infinite, not a number or beyond 2**53)")
 
 
 def _value_text(value: Any) -> str:  # noqa: ANN401 - a scalar or a list of them
@@ -311,7 +311,7 @@ NAME_OF: Callable[[type], str] = type.__dict__["__name__"].__get__
 
 
 class LimitReachedError(BaseException):
-    """The run has reached a limit. Any further use of fuel or a skill raises this error again."""
+    """The run has reached a limit. Each further loop iteration, call or skill raises this error again."""
 
 
 class SkillError(Exception):
@@ -325,7 +325,7 @@ ROBOT_ERROR_CLASSES: dict[str, type[SkillError]] = {}
 
 
 def robot_error(number: int, kind: str, text: str) -> SkillError:
-    """Return the exception for a robot error. Each kind of error has its own class."""
+    """Return the exception for the engine's robot error with this number. Each kind has its own class."""
     if kind not in ROBOT_ERROR_CLASSES:
         ROBOT_ERROR_CLASSES[kind] = type(kind, (SkillError,), {"__module__": "robot"})
     ROBOT_ERROR_CLASSES[kind].number = number

@@ -31,7 +31,7 @@ DESCRIPTOR_BYTES = 4  # size of a descriptor in a message
 
 
 def get_ready() -> tuple[socket, ProgramRun, Callable[[ProgramRun], None], Filter | None, int]:
-    """Prepare everything that runs share, and return the arguments for `serve`."""
+    """Prepare everything that all runs share, and return the arguments for `serve`."""
     door = socket(fileno=RUN_DOOR)
     run = ProgramRun()
     simulate_environment(run)
@@ -116,7 +116,7 @@ def _end_of(pid: int) -> int:
 
 
 def isolate(line: int, seccomp: Filter | None, seconds: int, parent: bytes) -> None:
-    """Isolate the forked child: make the socket its channel, and apply the limits and seccomp."""
+    """Isolate the forked child: make the socket `line` its channel, and apply the limits and seccomp."""
     os.dup2(line, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     die_with_parent()

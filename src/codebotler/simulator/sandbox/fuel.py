@@ -31,7 +31,7 @@ SCOPE_NODES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 def prepared(
     source: str, *, lowercase: bool, skills: frozenset[str] | None = None
 ) -> tuple[types.CodeType, bool]:
-    """Return a program's code, changed to use fuel, and whether it is tame. Without skills, it is wild."""
+    """Return a program's code, changed to use fuel, and whether it is tame (False without `skills`)."""
     if "\0" in source:
         line = source.count("\n", 0, source.index("\0")) + 1
         raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))
@@ -52,8 +52,7 @@ def prepared(
 def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
     """Return the nodes of a tree by type, without operators and contexts.
 
-    Raise MemoryError or SyntaxError if it is nested too deeply, since Python's own limits depend on the
-    version.
+    Raise MemoryError or SyntaxError if the tree is nested too deeply, since Python's limits vary by version.
     """
     nodes: defaultdict[type[ast.AST], list[Any]] = defaultdict(list)
     waiting: list[tuple[ast.AST, int, int]] = [(tree, 0, 0)]

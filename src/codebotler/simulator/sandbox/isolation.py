@@ -28,7 +28,7 @@ def give_up_rights(memory: int = MEMORY) -> None:
 
 
 def enclose(seccomp: Filter | None, seconds: int) -> None:
-    """Leave only the channel open, and limit processor time. Call `give_up_rights` first."""
+    """Leave only the channel open, and limit processor time to `seconds`. Call `give_up_rights` first."""
     set_limit("NPROC", 0)
     set_limit("NOFILE", CHANNEL + 1)
     limit_time(seconds)
@@ -37,7 +37,7 @@ def enclose(seccomp: Filter | None, seconds: int) -> None:
 
 
 def set_limit(name: str, value: int) -> None:
-    """Permanently set one limit. Systems other than Linux lack some limits, or refuse small values."""
+    """Permanently set a resource limit, such as NOFILE. Outside Linux, ignore limits that are refused."""
     kind = getattr(resource, "RLIMIT_" + name, None)
     try:
         if kind is not None:
@@ -93,7 +93,7 @@ def prctl(option: int, value: int = 0, other: int | bytes = 0) -> None:
     if sys.platform != "linux":
         return
     if _ctypes.call_function(_ctypes.dlsym(LIBC, "prctl"), (option, value, other, 0, 0)) != 0:
-        raise PermissionError(1, f"prctl({option}) was refused")
+        raise PermissionError(1, f"the kernel refused prctl({option})")
 
 
 SYSCALLS = {
@@ -156,7 +156,7 @@ def seccomp_filter(machine: str = MACHINE) -> Filter | None:
 
 
 def usable_filter() -> Filter | None:
-    """Return this machine's filter, or None if the kernel does not accept it, as in some containers."""
+    """Return this machine's seccomp filter, or None if the kernel refuses it, as in some containers."""
     seccomp = seccomp_filter()
     if seccomp is None:
         return None

@@ -19,7 +19,7 @@ ADDR_NO_RANDOMIZE = 0x0040000
 
 
 def main(descriptors: list[str]) -> None:
-    """Restart the interpreter if descriptors are given, else serve."""
+    """Restart the interpreter with the given descriptors, or serve if there are none, as after a restart."""
     if descriptors:
         start_again(list(map(int, descriptors)))
     sys.pycache_prefix = os.devnull  # a bytecode file that may or may not exist would move the heap

@@ -112,18 +112,16 @@ def hide_folders() -> None:
 
 
 class Select:
-    """Replaces `select.select`: waiting for files is forbidden, and a wait without files is a sleep.
+    """Replaces `select.select`: waiting for files is forbidden, and a wait without files is a sleep."""
 
-    This is a class, since a function would become a method in `selectors`.
-    """
-
+    # This is a class, since a function would become a method in `selectors`.
     def __init__(self, run: ProgramRun) -> None:
         self.run = run
 
     def __call__(
         self, read: list[object], write: list[object], other: list[object], timeout: float | None = None, /
     ) -> tuple[list[object], list[object], list[object]]:
-        """Wait for some seconds, or end the run if there is no timeout."""
+        """Let `timeout` simulated seconds pass, or end the run if there is no timeout."""
         if read or write or other:
             raise PermissionError(1, "Operation not permitted")
         if timeout is None:

@@ -67,11 +67,11 @@ OWN_SCOPES = (ast.FunctionDef, ast.Lambda, ast.ListComp, ast.DictComp, ast.Gener
 
 
 class WildError(Exception):
-    """Part of a program is not on the allowlist."""
+    """A part of a program is not on the allowlist, so the program is wild."""
 
 
 def wild(*_: object) -> NoReturn:
-    """Reject a node: raise WildError."""
+    """Reject a part of a program: raise WildError."""
     raise WildError
 
 
@@ -82,13 +82,7 @@ def parameters_of(given: ast.arguments) -> list[str]:
 
 
 def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
-    """Return whether a program is tame, so that it may share a process with others.
-
-    Args:
-        tree: the program's syntax tree.
-        nodes: all nodes of the tree by type.
-        skills: the names of the skills that the program may call.
-    """
+    """Return whether a program may share a process with others. `nodes` are its tree's nodes by type."""
     try:
         ProgramVerifier(nodes, skills).check(*tree.body)
     except (WildError, RecursionError):
@@ -97,7 +91,7 @@ def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
 
 
 class ProgramVerifier:
-    """Raises WildError for a part that is not allowed. `ALLOWED` has a check for each kind of node."""
+    """Raises WildError for a part of a program that is not allowed. `ALLOWED` has a check for each node."""
 
     def __init__(self, nodes: Nodes, skills: frozenset[str]) -> None:
         self.skills = skills
@@ -116,7 +110,7 @@ class ProgramVerifier:
             wild()
 
     def is_data(self, name: str) -> bool:
-        """Return whether a name is bound to data here, or not bound at all."""
+        """Return whether a name refers to data in the current function, or to nothing."""
         if name in self.functions:
             return False
         if name not in self.special:

@@ -26,7 +26,7 @@ class Thing:
         return Entity(self.label if self.is_pattern else re.escape(self.label), self.traits)
 
     def is_meant_by(self, request: str, matching: Matching = "label-in-request") -> bool:
-        """Return whether a request refers to this thing."""
+        """Return whether a request, such as "the red mug", refers to this thing."""
         if matching == "longest-name":
             return bool(best_fits(request, [self.entity]))
         if self.is_pattern:
@@ -49,7 +49,7 @@ class Somebody:
         return self.looks_before == 0 and not self.is_gone
 
     def is_meant_by(self, request: str, settings: SimulationSettings) -> bool:
-        """Return whether a request refers to this person: by no name, by theirs or by a word for people."""
+        """Return whether a request, which may be a name, a word for people or empty, means this person."""
         if settings.people == "answer-to-any-name" or not request.strip():
             return True
         if settings.matching == "longest-name":
@@ -63,7 +63,7 @@ class Somebody:
         return Entity(self.person.name, self.traits)
 
     def answer(self, question: str, settings: SimulationSettings) -> Answer | None:
-        """Return the person's answer to a question, or None if they have none."""
+        """Return the answer on the question's topic, or else the next answer; None if there is none."""
         for topic, answer in self.person.topics:
             if finds(question, topic, settings.matching):
                 return answer

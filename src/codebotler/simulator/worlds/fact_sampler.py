@@ -1,4 +1,4 @@
-"""Draws random facts for sampled worlds, each from the seed, the sample number and the fact's name only."""
+"""Chooses random facts for sampled worlds, each by the seed, the sample number and the fact's name only."""
 
 from __future__ import annotations
 
@@ -12,23 +12,32 @@ EIGHTS = 8
 
 @dataclass(frozen=True)
 class FactSampler:
-    """Draws the random facts of one sampled world. The order of the draws does not matter."""
+    """Chooses the random facts of one sampled world. The order in which they are chosen does not matter.
+
+    Args:
+        seed: a number that determines all results together with `sample`.
+        sample: the number of this world among the worlds with the same seed.
+        strict: whether facts that the program takes for granted are random as well; if not, they are true.
+        lucky: whether seven of eight choices are good: things and people are there, and people agree.
+        forced: facts with given results, which are not chosen at random.
+        by_options: whether an answer depends on the room and the options, and not on the question.
+    """
 
     seed: int = 0
-    sample: int = 0  # number of this world among the worlds with the same seed
-    strict: bool = False  # also draw facts that the program takes for granted; otherwise they hold
-    lucky: bool = False  # in seven of eight draws, things and people are present, and people agree
-    forced: tuple[Draw, ...] = ()  # facts whose results are given instead of drawn
-    by_options: bool = False  # an answer depends on the room and the options, not on the question
+    sample: int = 0
+    strict: bool = False
+    lucky: bool = False
+    forced: tuple[Draw, ...] = ()
+    by_options: bool = False
 
     def draw(self, count: int, *fact: str) -> int:
-        """Draw a number from 0 to `count - 1` for a fact. The same texts always give the same number."""
+        """Return a random number from 0 to `count - 1` for a fact, always the same for the same texts."""
         texts = [str(self.seed), str(self.sample), *fact]
         named = "".join(f"{len(text)}:{text}" for text in texts).encode(errors="surrogatepass")
         return int.from_bytes(blake2b(named, digest_size=8).digest(), "big") % count
 
     def decide(self, method: DrawMethod, *arguments: str | int) -> Draw:
-        """Return the given result of a fact from `forced`, or else draw it.
+        """Return a fact with its result: the one given in `forced`, or else a random one.
 
         Args:
             method: `answer`, `outcome` or `is_there`.
@@ -57,7 +66,7 @@ class FactSampler:
 
 @dataclass(frozen=True)
 class Draw:
-    """A random fact: its kind, the arguments of `FactSampler.decide`, and the result."""
+    """A random fact: its kind, its arguments of `FactSampler.decide`, and its result (a position or bool)."""
 
     method: DrawMethod
     arguments: tuple[Any, ...]
@@ -65,10 +74,10 @@ class Draw:
 
     @property
     def alternatives(self) -> list[Draw]:
-        """The same draw with each of its other possible results."""
+        """Copies of this fact, one for each other result that it could have had."""
         results = (True, False) if self.method == "is_there" else range(self.arguments[0])
         return [replace(self, result=result) for result in results if result != self.result]
 
     def holds_in(self, sampler: FactSampler) -> bool:
-        """Return whether a sampler draws the same result."""
+        """Return whether a sampler chooses the same result for this fact."""
         return sampler.decide(self.method, *self.arguments).result == self.result

@@ -14,8 +14,8 @@ Matching: TypeAlias = Literal["label-in-request", "whole-words", "longest-name"]
 """How requests refer to labels.
 
 - `label-in-request`: the first label that matches anywhere in the request, as in the paper.
-- `whole-words`: the first one that matches whole words of it, in the singular or plural.
-- `longest-name`: the label that equals it, else the one that matches most of its words.
+- `whole-words`: the first label that matches whole words of the request, in the singular or plural.
+- `longest-name`: the label that equals the request, or else the one that matches most of its words.
 """
 
 _ARTICLE = re.compile(r"^(?:the|an?|any|some)\s+")
@@ -33,7 +33,7 @@ _FILLERS = frozenset(
         *("named", "called", "of", "piece", "pieces"),
     }
 )
-"""Words of a description that tell nothing about a person or thing."""
+"""Words of a description that say nothing about a person or thing."""
 
 
 def is_in_request(label: str, request: str) -> bool:
@@ -42,7 +42,7 @@ def is_in_request(label: str, request: str) -> bool:
 
 
 def finds(request: str, label: str, matching: Matching) -> bool:
-    """Return whether a world's label, which is a regex, matches in a program's request or equals it."""
+    """Return whether a label, which is a regex, equals a program's request or matches a part of it."""
     pattern = label if matching == "label-in-request" else whole_words(label)
     return is_in_request(pattern, request) or request.lower() == label.lower()
 
@@ -73,12 +73,9 @@ _WORD = re.compile(r"[\w'\u2019-]+")
 
 
 def meant_by(request: str, labels: Iterable[str], *, plain: bool = False) -> list[str]:
-    """Return the label that equals a request, else those that match most of its words, as whole words.
+    """Return the label that equals a request, or else each label that matches the most of its whole words.
 
-    Args:
-        request: what a program asks for, such as "the red mug".
-        labels: regexes, as in world files.
-        plain: whether the labels are plain names instead.
+    `labels` are regexes, as in world files, or plain names if `plain` is true.
     """
     labels = tuple(labels)
     return [*_meant_by(request, labels, tuple(map(_escaped, labels)) if plain else labels)]
@@ -89,11 +86,7 @@ def goals_meant(
 ) -> list[str]:
     """Return the rooms and places that a request may mean. "The desk in the office" means only the desk.
 
-    Args:
-        request: what a program asks for, such as "the desk in the office".
-        goals: the rooms and places.
-        around: the room that contains each place.
-        plain: whether they are plain names instead of regexes.
+    `goals` are all rooms and places, as regexes or, if `plain`, names. `around` maps each place to its room.
     """
     if not around:
         return meant_by(request, goals, plain=plain)
@@ -137,7 +130,7 @@ class Entity(NamedTuple):
 
     Args:
         label: the regex that matches its names.
-        traits: the words that describe it; if there are any, a request must not contain others.
+        traits: words that describe it, such as "red". If it has any, no request with other words means it.
     """
 
     label: str
@@ -147,13 +140,10 @@ class Entity(NamedTuple):
 def best_fits(request: str, entities: Sequence[Entity], anybody: Sequence[str] = ()) -> list[int]:
     """Return the positions of the entities that a request fits best.
 
-    There are several only if the request contains the names of several entities. Of those that fit only by
-    their traits ("the tall person"), or that have equal names, the first is meant.
+    The result has several positions only if the request contains the names of several entities. If several
+    fit only by their traits ("the tall person"), or have equal names, it has only the first one.
 
-    Args:
-        request: what a program asks for, such as "the red mug".
-        entities: the candidates.
-        anybody: regexes for words that mean any of the candidates.
+    `anybody` contains regexes for words that mean any of the entities, such as "person".
     """
     counts = [_fit(request, *entity, tuple(anybody)) for entity in entities]
     best = [number for number, count in enumerate(counts) if count == max(counts) > 0]
@@ -203,7 +193,7 @@ def means_anybody(request: str, words_for_people: Sequence[str] = WORDS_FOR_PEOP
 
 
 def contains(request: str, name: str) -> bool:
-    """Return whether a request has a plain name in it, as whole words."""
+    """Return whether a request contains a plain name as whole words, as "the red mug" contains "mug"."""
     return bool(meant_by(request, [name], plain=True))
 
 

@@ -36,7 +36,7 @@ class SkillGuard(Protocol):
         """Raise RobotError if an action inside one of the user's own skills is forbidden."""
 
     def at_end(self) -> RobotError | None:
-        """Return an error if the run breaks a rule by ending now, or else None."""
+        """Return an error if the run breaks a rule by ending now, or None if it breaks none."""
 
 
 class SimulatedRobot(SimulatedWorld):
@@ -67,12 +67,12 @@ class SimulatedRobot(SimulatedWorld):
 
     @property
     def trace(self) -> Trace:
-        """The events so far."""
+        """The events of the run so far, in order."""
         return tuple(self.events)
 
     @property
     def own_skills(self) -> tuple[str, ...]:
-        """The skills that a copy made from `setup` would lack, such as the user's own."""
+        """The names of skills that a copy of this robot in a child process lacks, such as the user's own."""
         if "is_copied" not in vars(type(self)):
             return tuple(self.skills)
         if self.skills is SKILLS:
@@ -81,7 +81,7 @@ class SimulatedRobot(SimulatedWorld):
 
     @property
     def idle_skills(self) -> frozenset[str]:
-        """The skills that change neither the robot nor its world."""
+        """The names of the skills that change neither the robot nor its world, such as `get_all_rooms`."""
         someone_may_come = any(one.looks_before for here in self.occupants.values() for one in here)
         return self.skills.idle - {"is_in_room"} if someone_may_come else self.skills.idle
 
@@ -92,7 +92,7 @@ class SimulatedRobot(SimulatedWorld):
         return self.execute(skill, arguments)
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill without asking the guard."""
+        """Execute one skill as `perform` does, but without asking the guard."""
         row = self.skills[skill]
         assert row.does is not None, "the constructor checks this"
         if row.adds_event or row.fails:
@@ -107,7 +107,7 @@ class SimulatedRobot(SimulatedWorld):
     # --- effects of skills
 
     def drive(self, location: str) -> None:
-        """Drive to the room that a request means. Raise RobotError if it means none or could mean several."""
+        """Drive to the room that a request means. Raise RobotError if it means none or may mean several."""
         room = self.room_for(location)
         goal = None if room is None else self.full_names.get(room, room)
         if self.settings.events == "as-requested":
@@ -119,7 +119,7 @@ class SimulatedRobot(SimulatedWorld):
         self.room = room
 
     def look(self, entity: str) -> bool:
-        """Look for an object or a person. An absent person may arrive after some unsuccessful looks."""
+        """Return whether an object or a person is in this room. Some people come only after several looks."""
         settings, people = self.settings, self.people_here
         seen = any(thing.is_meant_by(entity, settings.matching) for thing in self.things_here)
         seen = seen or any(one.is_here and one.is_meant_by(entity, settings) for one in people)
@@ -140,7 +140,7 @@ class SimulatedRobot(SimulatedWorld):
             nobody, is_named = f'nobody is in "{self.room}"', self.settings.matching == "longest-name"
             if is_named and any(one.is_here for one in self.people_here):
                 nobody = f'nobody in "{self.room}" fits "{person}"'
-            raise RobotError("AskNoPerson", f'{nobody} to be asked "{question}"')
+            raise RobotError("AskNoPerson", f'{nobody}, so nobody can answer "{question}"')
         answer = asked.answer(question, self.settings)
         chosen = None if answer is None else choose(answer, question, options, self.settings)
         if chosen is None:
@@ -152,7 +152,7 @@ class SimulatedRobot(SimulatedWorld):
         return chosen
 
     def take(self, obj: str) -> None:
-        """Pick up the first matching object in this room."""
+        """Pick up the first matching object in this room. Raise RobotError if there is none."""
         if self.held is not None:
             raise RobotError(
                 "PickWhileHolding", f'the robot holds "{self.held}" and cannot pick up "{obj}" as well'
@@ -166,7 +166,7 @@ class SimulatedRobot(SimulatedWorld):
         self.held, self.taken = obj, thing
 
     def put(self, obj: str) -> None:
-        """Put down the object held under this name or, if events are `as-happened`, any matching name."""
+        """Put down the held object by the name used to pick it up (or, for `as-happened`, any that fits)."""
         taken = self.taken if self.settings.events == "as-happened" else None
         is_meant = taken is not None and taken.is_meant_by(obj, self.settings.matching)
         if self.held is None or (self.held != obj and not is_meant):
@@ -181,11 +181,11 @@ class SimulatedRobot(SimulatedWorld):
 
     @cached_property
     def state(self) -> dict[str, Any]:
-        """The values that skills store between calls."""
+        """The values that the user's own skills store between calls."""
         return {}
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Return the result of a skill without simulation code: the world's value, or else a random one."""
+        """Return the result of a skill that has no code: the world's value, or else a random one."""
         row, call = self.skills[skill], written_call(skill, plain(arguments))
         known, kinds = self._truths.get(call.casefold()), [kind for kind, _ in row.fails]
         if known in kinds:
@@ -207,13 +207,13 @@ class SimulatedRobot(SimulatedWorld):
         return results[number]
 
     def fail(self, kind: str) -> NoReturn:
-        """End the current skill with an error that it declares in `fails`."""
+        """Raise RobotError of a kind that the current skill declares in `fails`, or else UserError."""
         row = self._own_skill
         if row is None:
-            raise UserError(f'no skill is being executed that declares the error "{kind}"')
+            raise UserError(f'`fail("{kind}")` was called outside a skill; call it only in a skill')
         declared = dict(row.fails)
         if kind not in declared:
-            row.wrong(f'{row.name} declares no error "{kind}"; declare it, and when it happens, in `fails`')
+            row.wrong(f'{row.name} declares no error "{kind}"; add it to `fails`, and say when it happens')
         raise RobotError(kind, f"{row.name}: {declared[kind]}")
 
     def _own(self, row: Skill, arguments: Sequence[Argument]) -> Result:
@@ -245,7 +245,7 @@ class SimulatedRobot(SimulatedWorld):
     # --- the trace
 
     def sleep_until(self, now: float) -> None:
-        """Advance simulated time to `now` seconds since the start."""
+        """Set simulated time to `now` seconds since the start of the run."""
         self.now = now
 
     def record(
@@ -258,7 +258,7 @@ class SimulatedRobot(SimulatedWorld):
         to: str | None = None,
         destination: str | None = None,
     ) -> None:
-        """Record an event at the current place and time, without whitespace around its text."""
+        """Add an event to the trace, at the robot's place and time. The arguments are fields of `Event`."""
         given = text.strip(), to_options(options), None, found
         event = Event(kind, *given, self.place, self.now, self.held or "", to, destination=destination)
         if self.guard is not None:
@@ -266,11 +266,11 @@ class SimulatedRobot(SimulatedWorld):
         self.events.append(event)
 
     def repeat(self, events: Sequence[Event]) -> None:
-        """Record copies of earlier events in this room, at the current time."""
+        """Add copies of earlier events in this room to the trace, at the current time."""
         self.events += [replace(event, time=self.now) for event in events]
 
     def amend(self, answer: str) -> None:
-        """Add the answer to the last event, which is a question."""
+        """Add the answer to the last event of the trace, which must be a question."""
         self.events[-1] = replace(self.events[-1], answer=answer)
 
 

@@ -1,4 +1,4 @@
-"""The map of a world's rooms, which is known before any facts are drawn."""
+"""The map of a world's rooms, which is known before any random facts are chosen."""
 
 from __future__ import annotations
 
@@ -14,25 +14,38 @@ from codebotler.simulator.worlds.matching import goals_meant
 
 @dataclass(frozen=True)
 class RoomMap:
-    """The rooms of a world, and all else that is known before random facts are drawn."""
+    """The rooms, names, properties and past events that are known before random facts are chosen.
 
-    rooms: tuple[str, ...]  # in the order in which the robot lists them
+    Args:
+        rooms: the names of the rooms, in the order in which the robot lists them.
+        start: the room where the robot starts.
+        guessed: whether the rooms are a guess; if so, any other place that a program names exists as well.
+        plain: whether names are plain text and not regexes, as always on real robots.
+        plan: the rooms with their footprints, and with stopping points if the robot drives straight.
+        things: the names of known things, which may be anywhere.
+        people: the names of known people, who may be anywhere.
+        traits: the name and the properties of each thing or person that has properties.
+        places: the name of each place in a room, and the name of the room.
+        past: what the robot did and saw before the program begins.
+    """
+
+    rooms: tuple[str, ...]
     start: str
-    guessed: bool = False  # the rooms are a guess: any other place a program drives to exists as well
-    plain: bool = False  # names are plain text and not regexes, as always on real robots and guessed maps
-    plan: tuple[Room, ...] = ()  # footprints, and stopping points if the robot drives straight between rooms
-    things: tuple[str, ...] = ()  # the names of known things, which may be anywhere
-    people: tuple[str, ...] = ()  # the names of known people, who may be anywhere
-    traits: tuple[tuple[str, tuple[Trait, ...]], ...] = ()  # their properties
-    places: tuple[tuple[str, str], ...] = ()  # the places, each with the room that contains it
-    past: Trace = ()  # what the robot did and saw before the program begins
+    guessed: bool = False
+    plain: bool = False
+    plan: tuple[Room, ...] = ()
+    things: tuple[str, ...] = ()
+    people: tuple[str, ...] = ()
+    traits: tuple[tuple[str, tuple[Trait, ...]], ...] = ()
+    places: tuple[tuple[str, str], ...] = ()
+    past: Trace = ()
 
     def __post_init__(self) -> None:
         compose_fields(self)
 
     @classmethod
     def of(cls, world: World) -> RoomMap:
-        """Make the map of a world from a suite or file."""
+        """Return the map of a world. It lists the things and people, but not where they are."""
         plan = [replace(room, objects=(), people=()) for room in laid_out(world).rooms]
         return cls(
             tuple(room.name for room in world.rooms if not room.within),
@@ -46,20 +59,20 @@ class RoomMap:
 
     @classmethod
     def of_places(cls, world: World) -> RoomMap:
-        """Make the map of a robot that plans its own routes, and starts at the first place."""
+        """Return the map of a robot that plans its own routes and starts in the world's first room."""
         names = tuple(room.name for room in world.rooms)
         plan = tuple(Room(room.name, (), (), room.footprint) for room in world.rooms)
         return cls(names, names[0], plain=True, plan=plan)
 
     def room(self, request: str) -> str | None:
-        """Return the room that a request refers to, or None if there is none or there may be several."""
+        """Return the room that a request means, or None if it means none or may mean several."""
         meant = self._meant(request)
         if not meant and self.guessed:
             return request.strip() or None
         return meant[0] if len(meant) == 1 else None
 
     def possible_rooms(self, request: str) -> list[str]:
-        """Return all known rooms that any robot might drive to if it got this request."""
+        """Return all known rooms to which a drive with this request might lead, on any robot."""
         meant, wanted = self._meant(request), request.strip().casefold()
         if not self.plain or any(room.strip().casefold() == wanted for room in meant):
             return meant

@@ -15,9 +15,9 @@ class SampledFact:
     """A fact of a sampled world, such as `"mug" is in "hall"`.
 
     Args:
-        form: the fact in words, with `{}` in place of each name or text.
-        names: these names and texts.
-        is_random: False if it holds because the program assumed it.
+        form: the fact in words, such as `"{}" is in "{}"`, with `{}` for each name or text.
+        names: the names and texts for each `{}`.
+        is_random: False if the fact was not chosen at random, but is true because the program assumed it.
     """
 
     form: str
@@ -26,18 +26,18 @@ class SampledFact:
 
     @property
     def is_absence(self) -> bool:
-        """Whether somebody or something is not in a room."""
+        """Whether the fact says that somebody or something is not in a room."""
         return self.form.startswith("nobody") or " is not in " in self.form
 
     @property
     def sentence(self) -> str:
-        """The fact in words. Quotes in a name become single ones, so that they do not end its quotation."""
+        """The fact in words, such as `"mug" is in "hall"`. In names, double quotes become single ones."""
         names = map(brief, self.names)
         return self.form.format(*(name.replace('"', "'") if '"' in self.form else name for name in names))
 
 
 def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True) -> SampledFact:
-    """Return the fact that a person or thing is, or is not, in a room. The name is from `normalized`."""
+    """Return the fact that a person or thing is, or is not, in a room. `normalized` returns such names."""
     if name == SOMEBODY:
         return SampledFact(f'{SOMEBODY if is_there else "nobody"} is in "{{}}"', (room,), is_random)
     return SampledFact(f'"{{}}" {"is" if is_there else "is not"} in "{{}}"', (name, room), is_random)
@@ -48,14 +48,14 @@ def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True)
 
 @dataclass
 class ExploredRoom:
-    """A program's knowledge about one room. All names are from `normalized`."""
+    """What a program has found out about one room. All names have the form that `normalized` returns."""
 
     missed: set[str] = field(default_factory=set)  # looked for and not found
     gone: set[str] = field(default_factory=set)  # picked up here
     people: set[str] = field(default_factory=set)
 
     def lacks(self, name: str) -> bool:
-        """Return whether a name is known to be absent. If "red mug" finds nothing, neither does "mug"."""
+        """Return whether a name is known to be absent. If there is no "red mug", there is no "mug" either."""
         missed = self.missed
         return name in missed or (name != SOMEBODY and any(contains(longer, name) for longer in missed))
 
@@ -69,5 +69,5 @@ class RoomSearch:
 
     @property
     def is_lost(self) -> bool:
-        """Whether the program searched several rooms without success."""
+        """Whether the program searched at least two rooms, and found the person or thing in none."""
         return len(self.vain) > 1 and not self.found

@@ -1,4 +1,4 @@
-"""A robot in a sampled world, whose rooms are known and whose other facts are drawn at their first use."""
+"""A robot in a sampled world: its rooms are known, and each other fact is chosen at random when needed."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ AGREEING_TEXT = re.compile(r"\s*(?:yes|yeah|sure|ok)\b", re.IGNORECASE)
 
 
 class SampledRobot(SimulatedRobot):
-    """A robot in a world whose facts are drawn while the program runs, and never change once drawn.
+    """A robot in a world whose facts are chosen at random while the program runs, and then never change.
 
     If the program looks for a person or thing, their presence is random. Otherwise, the program's assumptions
     hold: a person answers, and a thing can be picked up. Answers are random options.
@@ -55,7 +55,7 @@ class SampledRobot(SimulatedRobot):
     A program that searches several rooms assumes that the thing is in one of them. If the thing is in none,
     `excuses` holds the resulting errors, which are not the program's fault.
 
-    Facts from the past of the room map hold as the robot last saw them.
+    What the robot last saw before the program began (`RoomMap.past`) is still true.
     """
 
     is_copied = True
@@ -91,7 +91,7 @@ class SampledRobot(SimulatedRobot):
 
     @property
     def idle_skills(self) -> frozenset[str]:
-        """The skills that change neither the robot nor its world once their facts are drawn."""
+        """The names of the skills that change neither the robot nor its world once their facts are chosen."""
         return self.skills.idle
 
     def possible_rooms(self, request: str) -> Sequence[str]:
@@ -105,7 +105,7 @@ class SampledRobot(SimulatedRobot):
 
     @property
     def here(self) -> ExploredRoom:
-        """The program's knowledge about the robot's current room."""
+        """What the program has found out about the robot's current room."""
         return self.explored[self.room]
 
     def search(self, name: str) -> RoomSearch:
@@ -120,7 +120,7 @@ class SampledRobot(SimulatedRobot):
 
     @contextmanager
     def excused(self, *, when: bool) -> Iterator[None]:
-        """Excuse errors raised in this context `when` random facts, and not the program, cause them."""
+        """Excuse the program for a RobotError raised in this context if `when` (in strict worlds, never)."""
         try:
             yield
         except RobotError as error:
@@ -183,7 +183,7 @@ class SampledRobot(SimulatedRobot):
             self._add(name, goal)
 
     def is_here(self, name: str) -> bool | None:
-        """Return whether a person or thing is in this room, or None if that is undecided."""
+        """Return whether a person or thing is in this room, or None if that is not decided yet."""
         things, around = self.things_here if name != SOMEBODY else [], self.explored[self._around]
         if name in self.here.missed and not any(thing.label == name for thing in things):
             return False
@@ -193,7 +193,7 @@ class SampledRobot(SimulatedRobot):
         return False if is_missed else None
 
     def settle(self, name: str, room: str, *, is_random: bool) -> bool:
-        """Decide whether a person or thing is in a room: at random, or as the program assumes."""
+        """Decide and return whether a person or thing is in a room: at random, or True as programs assume."""
         is_there = True
         if is_random:
             is_there = bool(self._draw("is_there", room, name))
@@ -208,7 +208,7 @@ class SampledRobot(SimulatedRobot):
         return self.draws[-1].result
 
     def answer(self, options: Sequence[str], *question: str) -> str:
-        """Draw the answer to a question from its options. `question` is its room, person and text."""
+        """Return a random option as a question's answer. `question` consists of its room, person and text."""
         if self.sampler.by_options:
             given = {option.strip().casefold(): option for option in options}
             options, name = [given[text] for text in sorted(given)], (question[0], *sorted(given))
@@ -219,7 +219,7 @@ class SampledRobot(SimulatedRobot):
         return options[self._draw("answer", len(options), agreeing, *question)]
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], errors: Sequence[str] = ()) -> int:
-        """Draw the number of a statement's outcome, or return the number that was drawn earlier."""
+        """Return the position, in `outcomes` and then `errors`, of a statement's random but fixed outcome."""
         possible = [*outcomes, *errors]
         if statement not in self.outcomes:
             drawn = self.outcomes[statement] = self._draw("outcome", len(possible), statement)
@@ -229,17 +229,17 @@ class SampledRobot(SimulatedRobot):
     # --- effects of skills
 
     def known_names(self, sort: Literal["room", "thing", "person"]) -> Sequence[str]:
-        """Return the names of all rooms, or of the things or people that are known to this house."""
+        """Return the names of all rooms, or of the things or people that the room map lists."""
         if sort == "room":
             return self.rooms
         return self.room_map.things if sort == "thing" else self.room_map.people
 
     def room_for(self, request: str) -> str | None:
-        """Return the room that a request refers to. On a guessed map, every place exists."""
+        """Return the room that a request means, or None. If the map is guessed, unknown rooms exist too."""
         return self.room_map.room(request)
 
     def look(self, entity: str) -> bool:
-        """Look for an object or a person. The first look draws whether they are present."""
+        """Return whether an object or a person is in this room. The first look decides this at random."""
         name = normalized(entity)
         described = [] if self.is_here(name) is not None else self._described(entity)
         if described:  # each of them is there or not
@@ -280,11 +280,11 @@ class SampledRobot(SimulatedRobot):
         return [] if means_anybody(entity) or meant_by(entity, known, plain=True) else fitting
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return the names of things that fit a description. Whether each is there is random."""
+        """Return the things `where` (anywhere if empty) that fit `is_` (all if empty); presence is random."""
         return self._all_of(self.room_map.things, where, is_ or "thing", is_person=False)
 
     def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:
-        """Return the names of people who fit a description. Whether each is there is random."""
+        """Return the people `where` (anywhere if empty) who fit `is_` and each trait; presence is random."""
         wanted = " ".join(str(one) for one in (is_, *traits.values()) if one) or SOMEBODY
         return self._all_of(self.room_map.people, where, wanted, is_person=True)
 
@@ -330,7 +330,7 @@ class SampledRobot(SimulatedRobot):
         return [entity.label for entity in entities if best_fits(wanted, [entity], words)]
 
     def move_person(self, name: str, room: str) -> None:
-        """Move a person to a room or place, away from all other rooms."""
+        """Move a person to a room, or to the room around a place. The person is then in no other room."""
         goal, who = self._room_around(self.goal_of(room)), normalized(name)
         for place, explored in self.explored.items():
             things = self.contents[place]
@@ -342,7 +342,7 @@ class SampledRobot(SimulatedRobot):
         self.explored[goal].people |= {who, SOMEBODY}
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Ask a person, who is present unless an earlier look failed to find them. The answer is random."""
+        """Ask a person, who is here unless a look failed (if strict, at random). Return a random position."""
         person, options = as_text(person), to_options(options)
         who = normalized(person)
         if not options or not self._answers(who):
@@ -372,7 +372,7 @@ class SampledRobot(SimulatedRobot):
         return is_there
 
     def take(self, obj: str) -> None:
-        """Pick up an object, which is present unless an earlier look failed to find it."""
+        """Pick up an object, which is here unless an earlier look failed (in strict worlds, at random)."""
         name = normalized(obj)
         if self.held is None and self.is_here(name) is None and self._lies_there(name):
             self._add(name, self.room)
@@ -391,7 +391,7 @@ class SampledRobot(SimulatedRobot):
         return self.settle(name, self.room, is_random=self.sampler.strict)
 
     def put(self, obj: str) -> None:
-        """Put down the held object, using exactly the name it was picked up under."""
+        """Put down the held object, as `SimulatedRobot.put` does."""
         with self.excused(when=self.held is None and self.search(normalized(obj)).is_lost):
             super().put(obj)
 

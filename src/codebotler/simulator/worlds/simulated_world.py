@@ -57,7 +57,7 @@ class SimulatedWorld:
 
     @cached_property
     def contents(self) -> dict[str, list[Thing]]:
-        """The objects in each room."""
+        """The objects in each room and place, by its name."""
         rooms, words = self.world.rooms, self._trait_words
         return {
             room.name: [Thing(one, traits=words.get(one, NO_WORDS)) for one in room.objects] for room in rooms
@@ -69,7 +69,7 @@ class SimulatedWorld:
 
     @cached_property
     def occupants(self) -> dict[str, list[Somebody]]:
-        """The people in each room, including people who arrive later."""
+        """The people in each room and place, by its name, including people who arrive later."""
         rooms, words = self.world.rooms, self._trait_words
         return {r.name: [Somebody(one, words.get(one.name, NO_WORDS)) for one in r.people] for r in rooms}
 
@@ -89,7 +89,7 @@ class SimulatedWorld:
 
     @property
     def people_here(self) -> list[Somebody]:
-        """The people in the robot's room, also those who will arrive later."""
+        """The people in the robot's room, including people who arrive later."""
         if len(self.rooms) == len(self.goals):
             return self.occupants[self.room]
         return [one for goal in self._reach[self._room_around(self.room)] for one in self.occupants[goal]]
@@ -101,7 +101,7 @@ class SimulatedWorld:
         return next((room.within for room in self.world.rooms if room.name == goal), "") or goal
 
     def possible_rooms(self, request: str) -> Sequence[str]:
-        """Return all rooms that a request may refer to; for an exact name, it and where it leads."""
+        """Return all rooms that a request may mean. A room's exact name may also fit another room's label."""
         if self.settings.matching == "longest-name":
             around = {room.name: room.within for room in self.world.rooms if room.within}
             return goals_meant(request, self.goals, around)
@@ -120,7 +120,7 @@ class SimulatedWorld:
         return resolve_room(self.goals, request, self.settings.matching)
 
     def thing_meant(self, request: str) -> Thing | None:
-        """Return the object in this room that a request refers to; raise RobotError if it may be several."""
+        """Return the object here that a request means, or None. Raise RobotError if it may mean several."""
         matching, here = self.settings.matching, self.things_here
         if matching != "longest-name":
             return next((thing for thing in here if thing.is_meant_by(request, matching)), None)
@@ -130,7 +130,7 @@ class SimulatedWorld:
         return best[0] if best else None
 
     def person_meant(self, request: str) -> Somebody | None:
-        """Return the person in this room whom a request refers to; raise RobotError if it may be several."""
+        """Return the person here whom a request means, or None. Raise RobotError if it may mean several."""
         settings, here = self.settings, [one for one in self.people_here if one.is_here]
         if settings.matching != "longest-name" or not request.strip():
             return next((one for one in here if one.is_meant_by(request, settings)), None)
@@ -144,13 +144,13 @@ class SimulatedWorld:
         return {statement.casefold(): value for statement, value in self.world.truths}
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return the names of the things in a room or at a place, or anywhere, that fit a description."""
+        """Return the names of the things `where` (anywhere if empty) that fit `is_` (all things if empty)."""
         found = [thing for goal in self._goals_in(where) for thing in self.contents[goal]]
         fitting = (one for one in found if not is_ or best_fits(is_, [one.entity], WORDS_FOR_THINGS))
         return [thing.label for thing in fitting]
 
     def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:
-        """Return the names of the people in a room, around a place, or anywhere, who fit all descriptions."""
+        """Return the names of the people `where` (anywhere if empty) who fit `is_` and each trait."""
         around = self._room_around(self.goal_of(where)) if where else ""
         found = [one for goal in self._goals_in(around) for one in self.occupants[goal] if one.is_here]
         wanted = [str(one) for one in (is_, *traits.values()) if one]
@@ -165,7 +165,7 @@ class SimulatedWorld:
         return self._reach.get(goal, (goal,))  # on a guessed map, there are more rooms
 
     def goal_of(self, request: str) -> str:
-        """Return the room or place that a request refers to; raise RobotError if there is none or several."""
+        """Return the room or place that a request means. Raise RobotError if that is unknown or unclear."""
         room = self.room_for(request)
         if room is None:
             raise unknown_room(request, self.possible_rooms(request))
@@ -176,19 +176,19 @@ class SimulatedWorld:
         return dict(dict(self.world.traits).get(name, ()))
 
     def move_person(self, name: str, room: str) -> None:
-        """Move the person whom a request refers to, wherever they are, to a room or place."""
+        """Move the person who fits `name` to a room or place. Raise RobotError if not exactly one fits."""
         goal = self.goal_of(room)
         everybody = [one for goal in self.goals for one in self.occupants[goal] if one.is_here]
         words = self.settings.words_for_people or WORDS_FOR_PEOPLE
         meant = best_fits(name, [one.entity for one in everybody], words)
         if len(meant) != 1:
-            raise RobotError("AskNoPerson", f'no person can be moved who fits "{name}"')
+            raise RobotError("AskNoPerson", f'"{name}" cannot be moved: use a name that fits one person')
         for here in self.occupants.values():
             here[:] = [one for one in here if one is not everybody[meant[0]]]
         self.occupants[goal].append(everybody[meant[0]])
 
     def value(self, statement: str, *values: Scalar) -> Any:  # noqa: ANN401 - any type
-        """Return the value that this world sets for a statement, or else one of several values at random."""
+        """Return the value that this world sets for a statement, or else a random one of `values`."""
         known = self._truths.get(statement.casefold())
         if known is not None:
             return known
@@ -214,7 +214,7 @@ class SimulatedWorld:
         return plain_names(labels)
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
-        """Draw the number of an outcome of a statement. The same world always gives the same one."""
+        """Return the position of a random outcome of a statement. It is always the same in the same world."""
         return self._sampler.draw(len(outcomes), statement)
 
     @cached_property
