@@ -123,7 +123,7 @@ class ModelError(Exception):
     """Raised if a model did not reply. A reply without a program is not an error.
 
     Args:
-        sentence: the cause and, if known, the fix, without keys.
+        sentence: the cause and, if known, the fix. It must not contain API keys.
         may_pass: whether the same request may succeed later.
         retry_after: how many seconds to wait, if the server asks for a delay, else None.
         is_refusal: whether the server rejected this prompt, rather than failing.
@@ -145,7 +145,7 @@ class BudgetSpentError(Exception):
 
     def __init__(self, budget: int, used: int) -> None:
         self.budget, self.used = budget, used
-        self.sentence = f"the token budget of {budget:,} is spent: {used:,} tokens were used"
+        self.sentence = f"the token budget of {budget:,} is used up: {used:,} tokens were used"
         super().__init__(self.sentence)
 
     def __reduce__(self) -> tuple[object, ...]:

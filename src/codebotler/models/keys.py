@@ -56,7 +56,7 @@ def redact(text: str) -> str:
 
 
 def remove_keys(text: str) -> str:
-    """Return a reply without values of key variables of 8 or more characters. Keep text like a key."""
+    """Return a reply without the values of key variables that have 8 or more characters."""
     secrets = _secrets(MIN_SECRET)
     return re.sub("|".join(secrets), KEY_REMOVED, text) if secrets else text
 

@@ -61,7 +61,7 @@ def _expect_wanted(batch: Sequence[_Job]) -> None:
 
 
 class LocalModel:
-    """A causal language model from a folder or the Hugging Face hub, run in this process, on a GPU if any.
+    """A language model from a folder or the Hugging Face hub, run in this process (on a GPU if there is one).
 
     It is a chat model if its tokenizer has a chat template, otherwise a base model. With a seed, replies are
     generated in blocks that depend only on the numbers of the replies, so a resumed run gives the same
@@ -181,7 +181,7 @@ class LocalModel:
             return [model_error(self.name, "the request was cancelled", may_pass=True)] * len(batch)
         except torch.cuda.OutOfMemoryError:
             if len(batch) == 1:
-                return [model_error(self.name, "not enough memory for this prompt", may_pass=False)]
+                return [model_error(self.name, "not enough memory; use a shorter prompt", may_pass=False)]
         torch.cuda.empty_cache()
         half = len(batch) // 2
         later = None if seed is None else seed + half

@@ -76,7 +76,7 @@ class UnknownInstructionError(ModelError):
     def __init__(self, model: str, instruction: str, closest: Sequence[str]) -> None:
         short = partial(brief, most=MAX_SHOWN_CHARACTERS)
         similar = " or ".join(f'"{short(known)}"' for known in closest)
-        sentence = f'{model} has no program for "{short(instruction)}"; similar instructions: {similar}'
+        sentence = f'{model} has no program for "{short(instruction)}"; try {similar}'
         super().__init__(sentence, may_pass=False)
         self.model, self.instruction, self.closest = model, instruction, tuple(closest)
 
@@ -127,7 +127,7 @@ class RecordedModel:
 
 
 def find_closest(instruction: str, known: Iterable[str]) -> list[str]:
-    """Return up to three known instructions, beginning with the most long words in common."""
+    """Return up to three known instructions that share the most long words with `instruction`."""
     words = {*LONG_WORD.findall(instruction.lower())}
 
     def rank(other: str) -> tuple[int, int]:

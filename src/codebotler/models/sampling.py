@@ -72,7 +72,7 @@ class SamplingSettings:
         return None if self.seed is None else self.seed + number
 
     def for_base_model(self, name: str) -> SamplingSettings:
-        """Add a token limit for the base model `name`. Raise UserError if a reasoning effort is set."""
+        """Return settings with a token limit for a base model. Raise UserError for a reasoning effort."""
         if self.reasoning_effort is not None:
             raise UserError(f"{name} is a base model and does not support a reasoning effort; remove it")
         return replace(self, max_tokens=self.max_tokens or PAPER_MAX_TOKENS)

@@ -54,7 +54,7 @@ def find_usable_models(servers: Mapping[str, int] = MODEL_SERVERS) -> list[Usabl
 
 
 def suggest_model(servers: Mapping[str, int] = MODEL_SERVERS) -> str:
-    """Return advice, such as `add --model NAME` for the first usable model, or else how to set one up."""
+    """Return advice: `add --model NAME` for the first usable model, or else how to set up a model."""
     first = find_usable_models(servers)[0]
     return MODEL_HINT if is_recorded(first.name) else f"add {first.options}"
 

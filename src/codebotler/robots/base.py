@@ -78,7 +78,7 @@ class Robot(Protocol):
         """The clock that times a program's sleeps."""
 
     def connect(self) -> None:
-        """Make the robot ready and still, with its clock at 0. Call this first, and again after `cancel`.
+        """Prepare the robot: it stands still, its clock shows 0. Call this first, and again after `cancel`.
 
         Raises:
             NotReadyError: the robot cannot be used. All resources have been released.
@@ -135,7 +135,7 @@ class CancelledError(Exception):
 
 @dataclass(frozen=True)
 class Readiness:
-    """Says whether one kind of robot can be used on this machine."""
+    """Says whether one kind of robot can be used on this machine, and what is missing if not."""
 
     name: str  # the kind: sim, pyrobosim, ros1, rosbridge or ros2
     works: bool  # whether all requirements are installed; the robot itself is not contacted

@@ -53,7 +53,7 @@ class FaceQuestion:
 
 @dataclass(frozen=True)
 class FaceState:
-    """What all screens show: up to three last sentences, the open question, and the last closed question."""
+    """What all screens show: the last three sentences, the open question, and the last closed question."""
 
     said: tuple[FaceSentence, ...] = ()
     question: FaceQuestion | None = None
@@ -91,7 +91,7 @@ class Face:
             self._add_screens(-1)
 
     def open(self) -> None:
-        """Clear the face, and let a new mission say and ask something."""
+        """Clear the face, so that a new mission can say and ask something."""
         with self._lock:
             self._is_open = True
             self._show(FaceState())

@@ -26,7 +26,7 @@ CERTIFICATE_VARIABLES = ("SSL_CERT_FILE", "SSL_CERT_DIR")
 
 
 def byte_limit(max_tokens: int | None) -> int:
-    """Return a generous limit in bytes for a reply with up to `max_tokens` tokens (None: unlimited)."""
+    """Return a generous limit in bytes for a reply with up to `max_tokens` tokens (None if unlimited)."""
     return max(MIN_REPLY_BYTES, BYTES_PER_TOKEN * (max_tokens or ASSUMED_TOKENS))
 
 
@@ -40,7 +40,7 @@ def limit_replies(client: HTTPClient, name: str, limit: int) -> HTTPClient:
     async def check(response: Any) -> None:  # noqa: ANN401 - see HTTPClient
         coding = response.headers.get("content-encoding", "identity")
         if coding != "identity":
-            sentence = f"{name}: the server compressed its reply ({coding}); turn compression off"
+            sentence = f"{name}: the server compressed its reply ({coding}); turn off its compression"
             raise ModelError(sentence, may_pass=False)
         response.stream = _limit_stream(response.stream, name, limit)
         if response.has_redirect_location:

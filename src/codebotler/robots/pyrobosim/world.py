@@ -165,7 +165,7 @@ class Motor(PathExecutor):
         self.feedback: Feedback = ignore_feedback
 
     def execute(self, path: Path, *_: float, **__: float) -> ExecutionResult:
-        """Follow a path to its end, or until the clock is stopped."""
+        """Follow a path, and return SUCCESS at its end, or CANCELED if the clock is stopped."""
         speed, began = self.clock.speed, self.clock.now
         way = get_constant_speed_trajectory(path, METRES_PER_SECOND, RADIANS_PER_SECOND)
         if speed is not None:

@@ -55,7 +55,7 @@ class Motion:
 
     @property
     def is_unseen(self) -> bool:
-        """Whether the pose is outdated: its robot has since moved more than 1 metre or 1 radian."""
+        """Whether the last pose is outdated: the robot has moved more than 1 metre or 1 radian since then."""
         return self._unseen > MAX_UNSEEN
 
     @property

@@ -95,7 +95,7 @@ class RosRobot(RosCaller):
 
     @property
     def failed_stop(self) -> str:
-        """A message if the robot still moves some seconds after a stop, or "" if it does not or is silent."""
+        """A message if the robot moves some seconds after a stop; "" if it is still or reports nothing."""
         worker, until = self._worker, time.monotonic() + self._waits.patience * 0.8
         if worker is None or not (self.connection.pose or self.connection.velocity):
             return ""

@@ -38,7 +38,7 @@ class RosWorker:
 
     It runs in its own session so that Ctrl-C does not end it before it has stopped the robot. If heartbeats
     from this process stop, the worker cancels the goal, since a suspended process cannot react to Ctrl-C.
-    `about` is the worker's first message, and `motion` the robot's motion.
+    `about` is the worker's message that it is ready, and `motion` the robot's motion.
 
     Args:
         python: the Python interpreter that runs the script.
@@ -183,7 +183,7 @@ class RosWorker:
 
 
 def executable(python: Path) -> str:
-    """Return the command for an interpreter. A bare name is sought in the current folder, then in PATH."""
+    """Return the command for an interpreter. A bare name is looked up in the current folder, then in PATH."""
     return str(python.absolute() if python.exists() else python)
 
 

@@ -70,8 +70,8 @@ class Connection:
         calls: the action, service or topic for each skill.
         robot: the kind of robot: ros1, rosbridge or ros2.
         places: the places that the robot can drive to, or None if unknown.
-        pose: the topic with the robot's poses, or an empty string.
-        velocity: the topic with the robot's velocities, or an empty string.
+        pose: the topic with the robot's poses, or "" if there is none.
+        velocity: the topic with the robot's velocities, or "" if there is none.
         frames: the frames of the map and of the robot if poses come from tf, else None.
         packages: folders of message packages to build if they are not installed.
         cameras: the camera topic and the detector model for each skill that looks at pictures.

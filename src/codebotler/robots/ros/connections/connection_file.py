@@ -99,7 +99,7 @@ def read_connection(path: Path, skills: SkillTable) -> Connection:
     folders = tuple(str((path.parent / folder).resolve()) for folder in form.packages)
     for number, folder in enumerate(folders):
         if not Path(folder).is_dir():
-            raise file.wrong(f"there is no folder {folder}; correct it", "packages", number)
+            raise file.wrong(f"there is no folder {folder}; correct the path", "packages", number)
     if form.keepout is not None and (form.robot != "ros2" or places is None):
         raise file.wrong("keepout needs places and Nav2; add places, and use robot: ros2", "keepout")
     tf = None if form.pose is None else form.pose.tf
@@ -151,7 +151,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     try:
         SkillCall("topic", "", "", request).fields(dict.fromkeys(known, ""))
     except (AttributeError, TypeError):
-        raise file.wrong("a field has a value and subfields; remove one", *at, MESSAGE_KEYS[kind]) from None
+        raise file.wrong("a path has a value and subfields; remove one", *at, MESSAGE_KEYS[kind]) from None
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
     whole, ros = _full_type(kind, form.type), skill.ros
     is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"

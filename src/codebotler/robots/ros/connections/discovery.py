@@ -71,7 +71,7 @@ def discover_offers(address: str, python: Path) -> list[str]:
 
 
 def draft_connection(offers: Iterable[str]) -> str:
-    """Return a draft of a file for `--connect`. Lines to complete and unused offers are comments."""
+    """Return a draft of a `--connect` file for offers. Lines to complete and unused offers are comments."""
     known = [
         offer
         for offer in sorted(offers)

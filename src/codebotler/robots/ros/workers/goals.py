@@ -219,7 +219,7 @@ class SkillWorker:
         goal.end_event.set()
 
     def pass_on(self, goal: Goal, feedback: dict[str, Any]) -> None:
-        """Report the text and number fields of a feedback message, at a limited rate."""
+        """Report the text and number fields of a feedback message, at most twice a second."""
         plain = {name: value for name, value in feedback.items() if not isinstance(value, (dict, list))}
         text = ", ".join(
             f"{name}: {value:.4g}" if isinstance(value, float) else f"{name}: {value}"

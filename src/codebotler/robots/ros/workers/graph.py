@@ -113,7 +113,7 @@ class Ros1Graph:
 
 
 def no_master(uri: str) -> str:
-    """Return a message that says that no master answers and what to do."""
+    """Return the message for a ROS master that does not answer at the address `uri`."""
     return f"no ROS master answers at {uri}; start one (roscore), or set ROS_MASTER_URI"
 
 

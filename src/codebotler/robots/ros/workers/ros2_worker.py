@@ -249,7 +249,7 @@ class Ros2Worker(SkillWorker):
             self.end(goal, "cancelled" if goal.cancelled else "error", state="rejected", text="")
 
     def update_status(self, server: Ros2Server, statuses: Any) -> None:
-        """Process the status messages of a server, as far as they are about the current goal."""
+        """Process those statuses from a server that are about the current goal."""
         goal = self.goal
         if goal is None or goal.is_over or goal.handle is None or goal.server is not server:
             return
@@ -298,7 +298,7 @@ def _check_sendable(message: Any, fields: Fields) -> None:
     from rclpy.serialization import serialize_message
 
     if r"\x00" in repr(fields).replace(r"\\", ""):  # ROS 2 truncates strings at NUL
-        raise ValueError("a string contains the character NUL")
+        raise ValueError("a string contains the character NUL; remove it")
     serialize_message(message)
 
 

@@ -34,7 +34,7 @@ RECALLED = 7
 
 @dataclass(frozen=True)
 class GoalUpdate:
-    """News about a goal, or, if `goal` is empty, a status message that only shows that a server is alive."""
+    """News about a goal. If `goal` is empty, the update only shows that the server is alive."""
 
     goal: str  # the goal id, or an empty string
     what: str  # status (which implies that the server has accepted the goal), feedback or ended
@@ -62,7 +62,7 @@ class Ros1Protocol:
             yield {"op": op, "topic": f"{server}/{name}", "type": of}
 
     def goal(self, server: str, _action: str, goal: str, fields: Fields) -> Fields:
-        """Return the message for the goal with id `goal`. It may be sent twice: servers accept an id once."""
+        """Return the message for the goal with id `goal`. Servers ignore a repeated id."""
         msg = {"goal_id": {"id": goal, "stamp": NO_STAMP}, "goal": fields}
         return {"op": "publish", "topic": f"{server}/goal", "msg": msg}
 
