@@ -46,7 +46,7 @@ class Reply:
     turn: str = field(default="", repr=False)  # if it was offered tools: the reply as its library writes it
 
     def data(self) -> dict[str, Any]:
-        """Return the reply as plain data for a row of JSON."""
+        """Return the reply as plain data, for a line of a JSON Lines file."""
         return {
             "program": self.program,
             "no_program": self.no_program,
@@ -72,7 +72,7 @@ def make_reply(
     """Extract the program from a model's text, and build a `Reply`.
 
     `opening` is the prompt that a base model continues, None for a chat model. `known_kind` says why there is
-    no program, if the server does. Without an answer, the text is a refusal, tool calls or an error message.
+    no program, if the server does. `has_answer` is False for a refusal, tool calls or an error message.
     """
     answer = text if has_answer else ""
     found = read_reply(
@@ -85,7 +85,7 @@ def make_reply(
 
 
 def ignore_text(_piece: str) -> None:
-    """Ignore a piece of a reply. This is the default listener."""
+    """Ignore a piece of a reply. This is the default `on_text` of `Model.reply`."""
 
 
 class Model(Protocol):
@@ -100,7 +100,7 @@ class Model(Protocol):
 
     @property
     def settings(self) -> SamplingSettings:
-        """The settings that are sent. Settings that the provider does not support are None."""
+        """The settings of all requests. Settings that the provider does not support are None."""
 
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
         """Request one reply.
@@ -123,7 +123,7 @@ class ModelError(Exception):
     """Raised if a model did not reply. A reply without a program is not an error.
 
     Args:
-        sentence: the cause and, if known, the fix, without keys.
+        sentence: the cause and, if known, the fix. It must not contain API keys.
         may_pass: whether the same request may succeed later.
         retry_after: how many seconds to wait, if the server asks for a delay, else None.
         is_refusal: whether the server rejected this prompt, rather than failing.
@@ -141,11 +141,11 @@ class ModelError(Exception):
 
 
 class BudgetSpentError(Exception):
-    """Raised if the token budget is used up, so no further request is made."""
+    """Raised instead of making a request if the token budget is used up."""
 
     def __init__(self, budget: int, used: int) -> None:
         self.budget, self.used = budget, used
-        self.sentence = f"the token budget of {budget:,} is spent: {used:,} tokens were used"
+        self.sentence = f"the token budget of {budget:,} is used up: {used:,} tokens were used"
         super().__init__(self.sentence)
 
     def __reduce__(self) -> tuple[object, ...]:

@@ -26,13 +26,13 @@ CLIENT_LOGGERS = (
 
 
 def read_key(variable: str) -> str | None:
-    """Return the key in a variable, or None. Raise UserError if it is not valid in an HTTP header."""
+    """Return the key in an environment variable, or None if it is blank. Raise UserError if it is invalid."""
     key = os.environ.get(variable, "")
     if not key.strip():
         return None
     if not (key.isascii() and key.isprintable() and key == key.strip()):
         raise UserError(
-            f"the key in {variable} has a line break, an outer space, or a character outside ASCII; "
+            f"the key in {variable} has a line break, a space at an end, or a non-ASCII character; "
             "set it again"
         )
     return key
@@ -49,14 +49,14 @@ def hide_variables(variables: Iterable[str]) -> Iterator[None]:
 
 
 def redact(text: str) -> str:
-    """Remove the values of key variables, and text that looks like a key, from an error or a log line."""
+    """Return an error or log line without the values of key variables and text that looks like a key."""
     # KEY_REMOVED comes first, since otherwise a short secret could match a part of it.
     rest = "|".join([re.escape(KEY_REMOVED), KEY_SHAPES, *_secrets(MIN_SECRET_IN_ERRORS)])
     return re.sub(rest, KEY_REMOVED, remove_keys(text))
 
 
 def remove_keys(text: str) -> str:
-    """Remove long values of key variables from a reply, but keep text that only looks like a key."""
+    """Return a reply without the values of key variables that have 8 or more characters."""
     secrets = _secrets(MIN_SECRET)
     return re.sub("|".join(secrets), KEY_REMOVED, text) if secrets else text
 
@@ -97,7 +97,7 @@ _REDACTION = _Redaction()
 def guard_logs() -> None:
     """Remove keys from client libraries' logs, and silence their warnings. Call this after importing them.
 
-    CodeBotler's own notes name the settings that a model does not support.
+    The warnings are not needed, because CodeBotler itself names the settings that a model does not support.
     """
     warnings.filterwarnings("ignore", module="|".join(CLIENT_LOGGERS))
     known = logging.root.manager.loggerDict

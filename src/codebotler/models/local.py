@@ -61,11 +61,11 @@ def _expect_wanted(batch: Sequence[_Job]) -> None:
 
 
 class LocalModel:
-    """A causal language model from a folder or the hub that runs in this process, on a GPU if available.
+    """A language model from a folder or the Hugging Face hub, run in this process (on a GPU if there is one).
 
     It is a chat model if its tokenizer has a chat template, otherwise a base model. With a seed, replies are
     generated in blocks that depend only on the numbers of the replies, so a resumed run gives the same
-    replies. Without a seed, waiting requests form a batch. The timeout is ignored.
+    replies. Without a seed, waiting requests form a batch. `settings.timeout` is ignored.
     """
 
     def __init__(self, path: str, settings: SamplingSettings) -> None:
@@ -99,7 +99,7 @@ class LocalModel:
         guard_logs()
 
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
-        """Request one reply."""
+        """Generate one reply. Raise ModelError if this fails."""
         start = time.monotonic()
         job = self._job(prompt, number)
         job.on_text = on_text
@@ -181,7 +181,7 @@ class LocalModel:
             return [model_error(self.name, "the request was cancelled", may_pass=True)] * len(batch)
         except torch.cuda.OutOfMemoryError:
             if len(batch) == 1:
-                return [model_error(self.name, "not enough memory for this prompt", may_pass=False)]
+                return [model_error(self.name, "not enough memory; use a shorter prompt", may_pass=False)]
         torch.cuda.empty_cache()
         half = len(batch) // 2
         later = None if seed is None else seed + half
@@ -251,7 +251,7 @@ class LocalModel:
 
 
 def find_source(path: str) -> str:
-    """Return a model's folder with `~` expanded, or its hub name. Raise UserError if there is no folder."""
+    """Return a model's folder with `~` expanded, or its hub name. Raise UserError if a folder is missing."""
     folder = Path(path).expanduser()
     if path.startswith((".", "/", "~")) and not folder.is_dir():
         raise UserError("there is no such model folder; correct the path", file=path)

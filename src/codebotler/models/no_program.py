@@ -36,7 +36,7 @@ _BY_REASON: Mapping[str, NoProgram] = {
 
 
 def is_cut_off(finish_reason: str | None) -> bool:
-    """Whether the server says that a reply reached the token limit."""
+    """Return whether the server says that a reply reached the token limit."""
     return (finish_reason or "").lower() in _CUT_OFF
 
 
@@ -50,8 +50,8 @@ def classify_reply(
 ) -> NoProgram | None:
     """Return why a reply contains no program, or None if it contains a program or text that may be one.
 
-    A reply that was cut off after a complete program contains it. A program that was itself cut off is
-    incomplete, even if it parses.
+    If a reply was cut off after a complete program, this program counts. If it was cut off inside a program,
+    the reply contains none, even if the part that arrived parses.
 
     Args:
         reply: the text, or None if it was not recorded.

@@ -60,21 +60,21 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
 
 
 def expect_server(*names: str) -> None:
-    """Raise UserError if no model runs on a server, because a base URL would then have no effect."""
+    """Raise UserError if none of the named models runs on a server, so that a base URL would be useless."""
     if not any(map(runs_on_server, names)):
         raise UserError(
-            f"no server runs {' or '.join(names)}; leave out the base URL, or choose a model such as "
+            f"{' and '.join(names)} cannot use a base URL; leave it out, or choose a model such as "
             "openai-chat:NAME"
         )
 
 
 def runs_on_server(name: str) -> bool:
-    """Whether a model is reached over HTTP, unlike recorded models and models in this process."""
+    """Return whether a model is reached over HTTP, unlike recorded models and models in this process."""
     return kind_of(name) not in {"recorded", "hf"}
 
 
 def kind_of(name: str) -> str:
-    """Validate a model's name without importing large libraries, and return the part before the colon."""
+    """Return the part of a model's name before the colon, or raise UserError if the name is invalid."""
     kind, _, rest = name.partition(":")
     if kind == "recorded":
         open_recorded(name)
@@ -113,14 +113,14 @@ class ConfigFile(BaseModel):
     @model_validator(mode="after")
     def _has_a_model_for_its_settings(self) -> Self:
         if self.model_fields_set & {"base_url", "max_tokens"} and "model" not in self.model_fields_set:
-            raise ValueError("base_url and max_tokens apply to a model; name the model as model:")
+            raise ValueError("base_url and max_tokens need a model; add one, such as model: openai-chat:NAME")
         return self
 
 
 def choose_model(name: str | None = None, base_url: str | None = None) -> ChosenModel:
-    """Choose the given model, or else the model in CODEBOTLER_MODEL or config.yaml, or a recorded model.
+    """Return the given model, or else the model in CODEBOTLER_MODEL or config.yaml, or a recorded model.
 
-    The address and the limit in config.yaml apply only to the model named there.
+    The server and the token limit in config.yaml apply only to the model that is named there.
 
     Raises:
         UserError: config.yaml is invalid.

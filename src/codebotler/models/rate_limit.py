@@ -65,7 +65,7 @@ class RateLimited:
     def __post_init__(self) -> None:
         limits = self.concurrency, self.requests_per_minute, self.token_budget
         if self.retries < 0 or any(limit is not None and not limit > 0 for limit in limits):
-            raise UserError("each limit for requests must be above 0")
+            raise UserError("concurrency, rate and token budget must be above 0, and retries at least 0")
         self._free = asyncio.Semaphore(self.concurrency)
 
     async def reply(

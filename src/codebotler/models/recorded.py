@@ -65,7 +65,7 @@ class InstructionSolutions(_RecordedPart):
 
 
 class RecordedFile(BaseModel):
-    """The part of a solutions file that the recorded models need. The benchmark reads the rest."""
+    """The part of a solutions file that the recorded models need. The benchmark reads the other parts."""
 
     recorded: tuple[InstructionSolutions, ...] = ()
 
@@ -76,7 +76,7 @@ class UnknownInstructionError(ModelError):
     def __init__(self, model: str, instruction: str, closest: Sequence[str]) -> None:
         short = partial(brief, most=MAX_SHOWN_CHARACTERS)
         similar = " or ".join(f'"{short(known)}"' for known in closest)
-        sentence = f'{model} has no program for "{short(instruction)}"; similar instructions: {similar}'
+        sentence = f'{model} has no program for "{short(instruction)}"; try {similar}'
         super().__init__(sentence, may_pass=False)
         self.model, self.instruction, self.closest = model, instruction, tuple(closest)
 
@@ -97,12 +97,12 @@ class RecordedModel:
     settings: SamplingSettings = field(default_factory=partial(SamplingSettings, None, None))
 
     def solution(self, instruction: str, index: int) -> Solution:
-        """Return the reply for completion `index`, counted from 0. The replies repeat in a cycle."""
+        """Return reply number `index`, counted from 0, to an instruction. The replies repeat in a cycle."""
         replies = self.replies[instruction]
         return replies[index % len(replies)]
 
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
-        """Return the recorded reply, which takes no time and no tokens."""
+        """Return a recorded reply at once. Raise UnknownInstructionError if there is none for the prompt."""
         known = {_words(instruction): instruction for instruction in self.replies}
         instruction = known.get(_words(prompt.instruction))
         if instruction is None:
@@ -119,7 +119,7 @@ class RecordedModel:
         program = self.rests.get((instruction, last_step))
         if program is None:
             what = f"{self.name} has no program for the rest of this mission after this step: {last_step}"
-            raise ModelError(f"{what}; choose a language model, or write the rest", may_pass=False)
+            raise ModelError(f"{what}; choose a language model, or write that program", may_pass=False)
         return program
 
     async def close(self) -> None:
@@ -127,7 +127,7 @@ class RecordedModel:
 
 
 def find_closest(instruction: str, known: Iterable[str]) -> list[str]:
-    """Return the known instructions that share the most long words with `instruction`, short ones first."""
+    """Return up to three known instructions that share the most long words with `instruction`."""
     words = {*LONG_WORD.findall(instruction.lower())}
 
     def rank(other: str) -> tuple[int, int]:
@@ -141,12 +141,12 @@ def _words(text: str) -> tuple[str, ...]:
 
 
 def is_recorded(name: str) -> bool:
-    """Whether a name belongs to a recorded model."""
+    """Return whether a name, such as `recorded:careful`, belongs to a recorded model."""
     return name.partition(":")[0] == "recorded"
 
 
 def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
-    """Open `recorded:careful`, `recorded:hasty` or `recorded:FOLDER`. `folder` may hold further solutions."""
+    """Open `recorded:careful`, `recorded:hasty` or `recorded:FOLDER`. `folder` can add solution files."""
     short = name.removeprefix("recorded").removeprefix(":") or RECORDED_NAMES[0]
     if short not in RECORDED_NAMES and Path(short).is_dir():
         own = _read(Path(short))

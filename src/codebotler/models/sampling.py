@@ -61,18 +61,18 @@ class SamplingSettings:
         if self.max_tokens is not None and self.max_tokens < 1:
             raise UserError(f"the token limit is {self.max_tokens}; it must be at least 1")
         if not 0 < self.timeout < math.inf:
-            raise UserError(f"the timeout is {self.timeout:g} seconds; it must be above 0")
+            raise UserError(f"the timeout is {self.timeout:g} seconds; it must be above 0 and finite")
         if self.base_url is not None:
             _check_url(self.base_url)
         for name in RESERVED_FIELDS.intersection(self.extra_body or ()):
             raise UserError(f'the extra body contains "{name}", which CodeBotler sets itself; remove it')
 
     def seed_of(self, number: int) -> int | None:
-        """Return the seed for reply `number`, counted from 0."""
+        """Return the seed for reply `number`, counted from 0, or None if no seed is set."""
         return None if self.seed is None else self.seed + number
 
     def for_base_model(self, name: str) -> SamplingSettings:
-        """Return the settings for a base model, or raise UserError if they have a reasoning effort."""
+        """Return settings with a token limit for a base model. Raise UserError for a reasoning effort."""
         if self.reasoning_effort is not None:
             raise UserError(f"{name} is a base model and does not support a reasoning effort; remove it")
         return replace(self, max_tokens=self.max_tokens or PAPER_MAX_TOKENS)

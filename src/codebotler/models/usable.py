@@ -43,7 +43,7 @@ class UsableModel:
 
 
 def find_usable_models(servers: Mapping[str, int] = MODEL_SERVERS) -> list[UsableModel]:
-    """List the models of local servers, then an example for each key, then the recorded models."""
+    """Return the models of local servers (given with their ports), one for each key, and recorded ones."""
     local = [model for server, port in servers.items() for model in _list_models(server, port)]
     keys = [key for key in KEY_VARIABLES if os.environ.get(key, "").strip()]
     by_key = [UsableModel(KEY_VARIABLES[key], f"{key} is set") for key in keys]
@@ -54,7 +54,7 @@ def find_usable_models(servers: Mapping[str, int] = MODEL_SERVERS) -> list[Usabl
 
 
 def suggest_model(servers: Mapping[str, int] = MODEL_SERVERS) -> str:
-    """Return the options that select the first usable model, or else how to set up a model."""
+    """Return advice: `add --model NAME` for the first usable model, or else how to set up a model."""
     first = find_usable_models(servers)[0]
     return MODEL_HINT if is_recorded(first.name) else f"add {first.options}"
 

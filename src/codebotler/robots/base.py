@@ -20,7 +20,7 @@ RobotArgument: TypeAlias = Scalar | tuple[Scalar, ...]
 """An argument of a skill: a single value, several values, or the options of a question."""
 
 RobotResult: TypeAlias = Scalar | list[str] | list[Scalar] | None
-"""The result of a skill, or for a question, the text of the chosen option."""
+"""The result of a skill: for a question, the text of the chosen option; None for a skill without a result."""
 
 STOP_BY_HAND = "STOP THE ROBOT BY HAND"
 ROS_PYTHON = Path("/usr/bin/python3")
@@ -39,11 +39,11 @@ Feedback: TypeAlias = Callable[[str | CameraPicture], None]
 
 
 def ignore_feedback(_: str | CameraPicture) -> None:
-    """Discard a progress report or a picture."""
+    """Discard a progress report or a picture. This is the default callback of `Robot.perform`."""
 
 
 class Robot(Protocol):
-    """Executes skills, one at a time, and can be stopped at any moment."""
+    """A robot that executes skills, one at a time, and can be stopped at any moment."""
 
     @property
     def name(self) -> str:
@@ -55,7 +55,7 @@ class Robot(Protocol):
 
     @property
     def if_tool_dies(self) -> str:
-        """A clause that says what happens to a running skill if this process is killed."""
+        """What happens to the robot if this process is killed, as a clause: `the robot ended as well`."""
 
     @property
     def rooms_are_regexes(self) -> bool:
@@ -71,14 +71,14 @@ class Robot(Protocol):
 
     @property
     def missing(self) -> Mapping[str, str]:
-        """The reason for each unavailable skill, by name. It is complete once the robot is connected."""
+        """Maps each unavailable skill to the reason. The mapping is complete once the robot is connected."""
 
     @property
     def clock(self) -> Clock:
         """The clock that times a program's sleeps."""
 
     def connect(self) -> None:
-        """Get the robot ready, at rest and with its clock at 0. Call this first, and again after `cancel`.
+        """Prepare the robot: it stands still, its clock shows 0. Call this first, and again after `cancel`.
 
         Raises:
             NotReadyError: the robot cannot be used. All resources have been released.
@@ -87,7 +87,7 @@ class Robot(Protocol):
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback, /
     ) -> RobotResult:
-        """Perform a skill and wait until it ends. Only one thread at a time may call this method.
+        """Perform a skill to its end, and return its result. Only one thread at a time may call this method.
 
         Args:
             skill: the name of the skill in the table.
@@ -108,7 +108,7 @@ class Robot(Protocol):
         """
 
     def disconnect(self) -> None:
-        """Stop the current skill and release all resources. Further calls have no effect."""
+        """Stop the current skill and release all resources. Later calls of `disconnect` have no effect."""
 
 
 class _SentenceError(Exception):
@@ -118,11 +118,11 @@ class _SentenceError(Exception):
 
 
 class NotReadyError(_SentenceError):
-    """Raised when a robot cannot be used. The sentence says why and how to fix that."""
+    """Raised when a robot cannot be used. Its `sentence` says why, and how to fix the problem."""
 
 
 class RobotLostError(_SentenceError):
-    """Raised when a connected robot no longer responds. The sentence says why."""
+    """Raised when a connected robot no longer responds. Its `sentence` says why."""
 
 
 class AnswerError(_SentenceError):
@@ -130,12 +130,12 @@ class AnswerError(_SentenceError):
 
 
 class CancelledError(Exception):
-    """Raised by a skill that was cancelled."""
+    """Raised by a skill that was cancelled because the robot was stopped."""
 
 
 @dataclass(frozen=True)
 class Readiness:
-    """Says whether one kind of robot can be used on this machine."""
+    """Says whether one kind of robot can be used on this machine, and what is missing if not."""
 
     name: str  # the kind: sim, pyrobosim, ros1, rosbridge or ros2
     works: bool  # whether all requirements are installed; the robot itself is not contacted

@@ -1,4 +1,4 @@
-"""A robot's clock, which follows real time, scaled time, or only the requested waits."""
+"""A robot's clock, which follows real time, runs faster or slower, or advances only by waits."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ class Clock:
 
     @property
     def now(self) -> float:
-        """The clock seconds since the start or the last restart."""
+        """The time since the clock was created or last restarted, in clock seconds."""
         if self.speed is None:
             return self._waited
         return (time.monotonic() - self._start) * self.speed
 
     def wait(self, seconds: float) -> bool:
-        """Wait for a number of clock seconds, 0 or more. Return False if the clock was stopped."""
+        """Wait for a number of clock seconds, 0 or more. Return True, or False if the clock was stopped."""
         if self.speed is not None:
             self._stopped.wait(min(seconds / self.speed, threading.TIMEOUT_MAX))
         elif not self._stopped.is_set():
@@ -45,7 +45,7 @@ class Clock:
         return not self._stopped.is_set()
 
     def stop(self) -> None:
-        """Interrupt all waits, and end later ones immediately until `restart`. This is thread-safe."""
+        """Interrupt all waits. Until `restart`, later waits return immediately. Any thread may call this."""
         self._stopped.set()
 
     def restart(self) -> None:

@@ -40,7 +40,7 @@ class FaceSentence:
 
 @dataclass(frozen=True)
 class FaceQuestion:
-    """A question that the robot asked. An answer must quote the question's number."""
+    """A question that the robot asked. An answer must give the question's number."""
 
     number: int
     person: str
@@ -53,7 +53,7 @@ class FaceQuestion:
 
 @dataclass(frozen=True)
 class FaceState:
-    """The state of all screens: the last sentences, the open question, and the question that ended last."""
+    """What all screens show: the last three sentences, the open question, and the last closed question."""
 
     said: tuple[FaceSentence, ...] = ()
     question: FaceQuestion | None = None
@@ -61,13 +61,15 @@ class FaceState:
 
 
 class Face:
-    """Keeps the robot's sentences and questions. It is thread-safe, and only `ask` blocks.
+    """Keeps the sentences and questions that all screens show. It is thread-safe, and only `ask` blocks.
 
     Args:
         seconds: the time limit for an answer, in real seconds.
 
     Attributes:
         changed: a callback that runs after each change.
+        shown: what all screens show now.
+        screens: the number of open screens.
     """
 
     def __init__(self, seconds: float = ANSWER_SECONDS) -> None:
@@ -81,7 +83,7 @@ class Face:
 
     @contextmanager
     def count_screen(self) -> Iterator[None]:
-        """Count one more open screen until the context ends."""
+        """Count a screen as open while the `with` block runs."""
         self._add_screens(1)
         try:
             yield
@@ -89,7 +91,7 @@ class Face:
             self._add_screens(-1)
 
     def open(self) -> None:
-        """Clear the face for a new mission."""
+        """Clear the face, so that a new mission can say and ask something."""
         with self._lock:
             self._is_open = True
             self._show(FaceState())
@@ -107,11 +109,11 @@ class Face:
             self._show(replace(self.shown, said=(*self.shown.said, said)[-MAX_SENTENCES:]))
 
     def ask(self, person: str, text: str, options: Sequence[str]) -> int:
-        """Ask a question, wait for an answer, and return the index of the chosen option.
+        """Ask a person a question, wait for the answer, and return the index of the chosen option.
 
         Raises:
             RobotError: nobody answered in time.
-            CancelledError: the question was withdrawn.
+            CancelledError: the question was withdrawn, or the mission was stopped before.
         """
         with self._lock:
             question = FaceQuestion(
@@ -132,11 +134,11 @@ class Face:
         return ended.answer
 
     def answer(self, number: int, option: int) -> None:
-        """Answer the question with this number, or raise AnswerError if it is closed or lacks the option."""
+        """Answer question `number` with the index of an option. Raise AnswerError if late or invalid."""
         with self._lock:
             question = self.shown.question
             if question is None or question.number != number:
-                raise AnswerError("that question is closed: it was answered or withdrawn, or its time is up")
+                raise AnswerError("the question is closed: it was answered or withdrawn, or the time is up")
             if not 0 <= option < len(question.options):
                 raise AnswerError("the answer is not one of the options; choose one from the list")
             self._end("answered", option)
@@ -164,7 +166,7 @@ class Face:
 
 
 def without_speech(skills: SkillTable = SKILLS) -> SkillTable:
-    """Return the skills that a robot with a face performs itself, without spoken ones such as `say`."""
+    """Return a skill table without its spoken skills, such as `say` and `ask`, which a face can perform."""
     return SkillTable(tuple(skill for skill in skills.rows if _speech_of(skill) is None))
 
 
@@ -174,7 +176,7 @@ def _speech_of(skill: Skill) -> Recording | None:
 
 
 class RobotWithFace:
-    """Wraps a robot so that a face performs the spoken skills, and the robot does everything else."""
+    """Wraps a robot so that a face performs the spoken skills, and the robot all other skills."""
 
     def __init__(self, robot: Robot, face: Face, skills: SkillTable = SKILLS) -> None:
         self._robot, self._face, self.skills = robot, face, skills
@@ -184,7 +186,7 @@ class RobotWithFace:
 
     @property
     def missing(self) -> Mapping[str, str]:
-        """The reason for each skill that the wrapped robot lacks, by name, without the spoken skills."""
+        """Maps each skill that the wrapped robot lacks to the reason. Spoken skills are not included."""
         return {
             skill: why for skill, why in self._robot.missing.items() if _speech_of(self.skills[skill]) is None
         }
@@ -203,9 +205,8 @@ class RobotWithFace:
             return self._robot.perform(skill, arguments, feedback)
         screens = self._face.screens
         feedback(f"shown on {counted(screens, 'face')}" if screens else "no face is open")
-        given = dict(
-            zip((parameter.name for parameter in self.skills[skill].parameters), arguments, strict=True)
-        )
+        names = [parameter.name for parameter in self.skills[skill].parameters]
+        given = dict(zip(names, arguments, strict=True))
         text = str(given.pop(spoken.text))
         if spoken.options is None:
             self._face.say(text)
@@ -213,7 +214,7 @@ class RobotWithFace:
                 raise CancelledError
             return None
         offered = given.pop(spoken.options)
-        assert isinstance(offered, tuple), "a mission checks the arguments of a program"
+        assert isinstance(offered, tuple), "the options of a question are not a tuple"
         options = tuple(map(str, offered))
         return options[self._face.ask(", ".join(map(str, given.values())), text, options)]
 

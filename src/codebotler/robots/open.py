@@ -63,14 +63,14 @@ def open_robot(name: str, options: Options | None = None) -> Robot:
 
 
 def open_with_face(name: str, options: Options, face: Face) -> Robot:
-    """Open a robot whose spoken skills, such as `say` and `ask`, use a face instead of the robot."""
+    """Open a robot whose spoken skills, such as `say` and `ask`, are performed on the screens of `face`."""
     silent = open_robot(name, replace(options, skills=without_speech(options.skills)))
     lacking = without_speech(options.skills).without(silent.skills)
     return RobotWithFace(silent, face, options.skills.without(lacking))
 
 
 def check_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:
-    """Check for each kind of robot whether it can be used on this machine, and what is missing if not."""
+    """Return for each kind of robot whether it can be used here. `ros_python` is the Python that has ROS."""
     return [_readiness(name, ros_python) for name in ROBOT_KINDS]
 
 
@@ -103,7 +103,7 @@ class SpellingRobot:
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Perform a skill. Send names as the robot spelled them earlier, and return names composed (NFC)."""
+        """Perform a skill with names as the robot spelled them before. Return composed names (NFC)."""
         given = [self._spellings.get(one, one) if isinstance(one, str) else one for one in arguments]
         result = self._robot.perform(skill, given, feedback)
         for text in result if isinstance(result, list) else [result]:

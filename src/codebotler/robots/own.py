@@ -40,11 +40,11 @@ def is_own(name: str) -> bool:
 
 
 class OwnRobot:
-    """Performs skills by calling the methods of a user's object.
+    """Performs skills by calling the methods of an object of the user's class.
 
-    Its `rooms()` must list the rooms. Its `stop()` must stop the robot at once. Any thread may call it while
-    another method runs. To report a failure, a method raises RobotError or an exception named after an
-    error that the skill declares. Any other exception ends the mission.
+    The class needs `rooms()`, which lists the rooms, and `stop()`, which stops the robot at once and may be
+    called by any thread while another method runs. To report a failure, a method raises RobotError or an
+    exception named after an error that the skill declares. Any other exception ends the mission.
 
     Args:
         name: the file and the class, such as `lab_robot.py:Spot`.
@@ -88,7 +88,7 @@ class OwnRobot:
         return method if callable(method) else None
 
     def connect(self) -> None:
-        """Call the object's `connect` if it has one, and set the clock to 0."""
+        """Call the object's `connect`, if any, and set the clock to 0. Raise NotReadyError if that fails."""
         if not self._stop_returned.is_set():
             raise NotReadyError(f"an earlier call of {self.name}.stop has not returned; check the robot")
         if self._loop is None:
@@ -163,7 +163,7 @@ class OwnRobot:
         try:
             self._finish(self._body.stop(), STOP_SECONDS)
         except Exception as error:  # noqa: BLE001 - cancel must not raise
-            why = "it took too long" if isinstance(error, TimeoutError) else _describe(error)
+            why = f"no return in {STOP_SECONDS:g} s" if isinstance(error, TimeoutError) else _describe(error)
             self.failed_stop = f"{self.name}.stop failed: {why}; {STOP_BY_HAND}"
         else:
             self.failed_stop = ""
@@ -192,7 +192,7 @@ class OwnRobot:
         """Return the result of a method call. If the method is async, run it and wait for the result."""
         if not inspect.iscoroutine(result):
             return result
-        assert self._loop is not None, "the robot is connected"
+        assert self._loop is not None, "the robot is not connected"
         future = asyncio.run_coroutine_threadsafe(result, self._loop)
         if patience is None:
             self._running = future
@@ -237,7 +237,7 @@ def _make_body(path: Path, kind: str) -> Any:  # noqa: ANN401 - of a user's clas
         n for n, one in vars(module).items() if inspect.isclass(one) and one.__module__ == module.__name__
     ]
     if kind not in classes:
-        hint = f"; its classes are {listed(classes)}" if classes else ""
+        hint = f"; its classes are {listed(classes)}" if classes else "; add it"
         raise UserError(f"the file has no class {kind}{hint}", file=path)
     body = getattr(module, kind)
     line = inspect.getsourcelines(body)[1]

@@ -42,12 +42,12 @@ class Places:
     places: tuple[NamedPlace, ...]
 
     def world(self, robot: str = "") -> World:
-        """Return a world that has these places as rooms and the robot in the given room."""
+        """Return a world with these places as its rooms. `robot` names the room that the robot is in."""
         rooms = (Room(one.name, footprint=one.polygon, stand_at=(one.x, one.y)) for one in self.places)
         return World(tuple(rooms), robot)
 
     def room_at(self, x: float, y: float) -> NamedPlace | None:
-        """Return the place with the smallest polygon that contains a point in metres, or None."""
+        """Return the place with the smallest polygon around a point in metres, or None if there is none."""
         around = (one for one in self.places if one.polygon and is_within((x, y), one.polygon))
         return min(around, key=lambda one: _area(one.polygon or ()), default=None)
 
@@ -56,7 +56,7 @@ class Places:
         return min(self.places, key=lambda one: math.dist((one.x, one.y), (x, y)))
 
     def named(self, text: str) -> NamedPlace | None:
-        """Return the place with the given name, ignoring case and surrounding spaces, or None."""
+        """Return the place with this name, ignoring case and outer spaces, or None if there is none."""
         return next((one for one in self.places if one.name.casefold() == text.strip().casefold()), None)
 
 
@@ -77,7 +77,7 @@ class PlacesFile(_PlacesForm):
 
 
 class PlacesMapping(_PlacesForm):
-    """Says where a YAML or JSON file has places. In a path such as `rooms.*`, `*` matches any key."""
+    """Says where to find places in a YAML or JSON file. In a path such as `rooms.*`, `*` matches any key."""
 
     file: Name
     frame: Name = "map"
@@ -106,7 +106,7 @@ def read_places(source: object, at: YamlFile) -> Places:
         file = YamlFile.read(Path(at.name).parent / mapping.file)
         frames.append(file.validate(PlacesFile).frame if isinstance(one, str) else mapping.frame)
         if frames[-1] != frames[0]:
-            raise at.wrong(f'frame "{frames[-1]}" differs from "{frames[0]}" of other places; use one', *here)
+            raise at.wrong(f'the frame is "{frames[-1]}" here, but "{frames[0]}" above; use one', *here)
         entries = [*_find_entries(mapping, file.data)]
         if not entries:
             sentence = f'"{mapping.each}" matches no named place in {file.name}'
@@ -160,12 +160,12 @@ def _make_place(
     corners, paths, size = _find(entry, mapping.polygon), mapping.pose, mapping.resolution
     polygon = [(x, y) for x, y, *_ in map(_numbers, corners)] if isinstance(corners, list) else []
     if corners is not None and not polygon[2:]:
-        raise ValueError("its polygon has fewer than three corners")
+        raise ValueError("the polygon has fewer than three corners")
     pose = _find(entry, paths) if isinstance(paths, str) else [_find(entry, path) for path in paths]
     if polygon and (pose is None or (pose is entry and _find(entry, "x") is None)):
         pose = [sum(parts) / len(polygon) for parts in zip(*polygon, strict=True)]
         if not is_within((pose[0], pose[1]), polygon):
-            raise ValueError("it has no x and y, and the middle of its corners is outside its polygon")
+            raise ValueError("x and y are missing, and the middle of the corners is outside the polygon")
     x, y, *turn = _numbers(pose)
     points = [(x, y), *polygon]
     if size is not None:

@@ -82,7 +82,7 @@ class Reservation:
 
 
 def robot_file(robot: str, address: str, kind: str) -> Path:
-    """Return the path of this user's file about the robot at an address, with a suffix such as `lock`."""
+    """Return the path of this user's file about a robot. `robot` is its kind, `kind` is a suffix: `lock`."""
     digest = sha256(normalize_address(address).encode(errors="surrogatepass")).hexdigest()
     return lock_folder() / f"{robot} {digest}.{kind}"
 
@@ -101,7 +101,7 @@ def lock_folder() -> Path:
         folder.mkdir(mode=0o700)
     if not _is_ours(folder):
         raise NotReadyError(
-            f"{folder}, which holds robot locks, is not a folder or is writable by others; remove it"
+            f"{folder} holds robot locks, but is not a folder that only you can write to; remove it"
         )
     return folder
 
@@ -117,10 +117,10 @@ def _is_ours(folder: Path) -> bool:
 
 
 def normalize_address(address: str) -> str:
-    """Return the canonical form of an address: with a port, without user, capitals and trailing slashes.
+    """Return an address in a form for comparison: with a port, a lower-case host, and no user or final slash.
 
-    Invalid addresses stay unchanged, and all names of this machine become the same. Use the result only to
-    compare addresses. Connect to the original, since a server may listen on only one of its machine's names.
+    Names of this machine become 127.0.0.1, and invalid addresses stay unchanged. Connect to the original
+    address, since a server may listen on only one of its machine's names.
     """
     try:
         parts = urlsplit(address.strip())

@@ -1,4 +1,4 @@
-"""A simulated robot that drives at a walking pace."""
+"""A simulated robot that drives at 0.5 metres per second."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ OFFICE = Path(__file__).with_name("office.yaml")
 
 
 class Simulated:
-    """A simulated robot whose skills take time.
+    """A simulated robot that needs time to drive and to perform its other skills.
 
     Args:
         world: the world that the robot works in.
@@ -65,7 +65,7 @@ class Simulated:
 
     @classmethod
     def open(cls, options: Options) -> Self:
-        """Create a robot, or raise UserError if the options contain no world."""
+        """Create a robot. Raise UserError if the options have no world, or a speed that is out of range."""
         if options.world is None:
             raise UserError("a simulated robot needs a world; name one with --world FILE")
         return cls(options.world, speed=options.speed, skills=options.skills)
@@ -77,11 +77,10 @@ class Simulated:
         self.clock.restart()
 
     def resume(self, past: Trace) -> None:
-        """Bring the robot and the world to where they were after the steps of an earlier mission."""
+        """Repeat the successful steps of an earlier mission without delays, to restore its world."""
         for event in (one for one in past if not one.failed):
-            row = next(
-                (one for one in self.skills.rows if one.recording and one.recording.kind == event.kind), None
-            )
+            rows = (one for one in self.skills.rows if one.recording and one.recording.kind == event.kind)
+            row = next(rows, None)
             if row is not None:
                 with suppress(RobotError):  # the world is another one, or a person said that this happened
                     perform_at_once(self._robot, row.name, arguments_of_event(row, event))
@@ -90,7 +89,7 @@ class Simulated:
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Perform a skill, including the time it takes.
+        """Perform a skill, wait as long as the skill takes, and return its result.
 
         Raises:
             RobotError: the skill failed.
@@ -106,11 +105,11 @@ class Simulated:
         return perform_at_once(self._robot, skill, arguments)
 
     def cancel(self) -> None:
-        """Stop the robot immediately."""
+        """Stop the robot immediately, and refuse further skills until the next `connect`."""
         self.clock.stop()
 
     def disconnect(self) -> None:
-        """Stop the robot, which has no connection to close."""
+        """Stop the robot. A simulated robot has no connection to close."""
         self.cancel()
 
     def _drive(self, room: str, feedback: Feedback) -> None:
@@ -135,7 +134,7 @@ class Simulated:
 
 
 def perform_at_once(robot: SimulatedRobot, skill: str, arguments: Sequence[RobotArgument]) -> RobotResult:
-    """Perform a skill in the simulator without delays. Options and the answer are plain strings."""
+    """Perform a skill in the simulator without delays. For a question, return the chosen option."""
     taken = robot.skills[skill].parameters
     given = [
         tuple(Option(str(text)) for text in a) if parameter.is_options and isinstance(a, tuple) else a

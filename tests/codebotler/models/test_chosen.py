@@ -59,7 +59,7 @@ def test_without_codebotler_home_the_file_is_in_the_config_folder(
         ("modl: a\nmodel: b\n", "line 1.*modl"),
         ("model: [a]\n", "line 1"),
         ("model: ''\n", "line 1"),
-        ("base_url: http://127.0.0.1:1/v1\n", "line 1.*name the model as model"),
+        ("base_url: http://127.0.0.1:1/v1\n", "line 1.*need a model; add one"),
         ("model: a\nmax_tokens: 0\n", "line 2"),
     ],
 )

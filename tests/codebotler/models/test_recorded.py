@@ -184,7 +184,7 @@ def test_recorded_model_refuses_a_base_url() -> None:
 
 def test_of_several_models_one_is_enough_for_a_base_url() -> None:
     expect_server("recorded", "openai-chat:mine")
-    with pytest.raises(UserError, match="recorded or recorded:hasty"):
+    with pytest.raises(UserError, match="recorded and recorded:hasty"):
         expect_server("recorded", "recorded:hasty")
 
 

@@ -62,7 +62,7 @@ class BatchModel:
         """Return the request for reply `number` to a prompt, counted from 0."""
         if prompt not in self._bodies:
             self._reply(prompt, number, _response(200, EMPTY_ANSWER))
-            assert self._sent is not None, "the model sends its request to this object"
+            assert self._sent is not None, "the model sent no request"
             sent = json.loads(self._sent.content)
             self._bodies[prompt] = {name: value for name, value in sent.items() if name not in STREAM_FIELDS}
         seed = self.settings.seed_of(number)  # requests for the same prompt differ only in their seed
@@ -71,14 +71,14 @@ class BatchModel:
         return BatchRequest("/v1/chat/completions" if is_chat else "/v1/completions", body)
 
     def reply(self, prompt: Prompt, *, number: int, status: int, body: object) -> Reply:
-        """Parse the HTTP status and JSON of an answer, or raise ModelError if the answer is an error."""
+        """Return the reply in an answer with this HTTP status and JSON body, or raise ModelError."""
         if status < FIRST_ERROR and not _has_choice(body):
             raise error_in_reply(self.name, body)
         short = replace(prompt, messages=prompt.messages[-1:])  # encoding a long prompt would only cost time
         return replace(self._reply(short, number, _response(status, body)), latency_s=None)
 
     def close(self) -> None:
-        """Close the client."""
+        """Release all resources."""
         self._runner.run(self._model.close())
         self._runner.close()
 

@@ -80,7 +80,7 @@ class ChatModel:
         guard_logs()
 
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
-        """Request one reply."""
+        """Request one reply. Raise ModelError if no complete reply arrives."""
         start = time.monotonic()
         settings = self._request_settings
         if (seed := self.settings.seed_of(number)) is not None:
@@ -169,9 +169,8 @@ class ChatModel:
                 return no_connection or model_error(self.name, error, may_pass=may_pass)
             case exceptions.UnexpectedModelBehavior():
                 return incomplete_error(self.name, has_begun=False)
-        is_transport = (
-            isinstance(error, OSError) or type(error).__module__.split(".")[0] in TRANSPORT_PACKAGES
-        )
+        library = type(error).__module__.split(".")[0]
+        is_transport = isinstance(error, OSError) or library in TRANSPORT_PACKAGES
         return model_error(self.name, f"{type(error).__name__}: {error_text(error)}", may_pass=is_transport)
 
 
@@ -213,7 +212,10 @@ def _usage_in_chunk(usage: CompletionUsage | None) -> Usage:
 
 
 def supported_settings(model: Model, name: str, settings: SamplingSettings) -> SamplingSettings:
-    """Remove settings that a model does not support, and add a token limit if its provider requires one."""
+    """Return the settings that a model supports, with a token limit if its provider requires a limit.
+
+    Raise UserError for an extra body or a reasoning effort that the model does not support.
+    """
     if "seed" in model.unsupported_settings:
         settings = replace(settings, seed=None)
     if settings.extra_body is not None and "extra_body" in model.unsupported_settings:

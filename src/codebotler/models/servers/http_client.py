@@ -26,7 +26,7 @@ CERTIFICATE_VARIABLES = ("SSL_CERT_FILE", "SSL_CERT_DIR")
 
 
 def byte_limit(max_tokens: int | None) -> int:
-    """Return a generous size limit, in bytes, for a reply with up to `max_tokens` tokens."""
+    """Return a generous limit in bytes for a reply with up to `max_tokens` tokens (None if unlimited)."""
     return max(MIN_REPLY_BYTES, BYTES_PER_TOKEN * (max_tokens or ASSUMED_TOKENS))
 
 
@@ -40,7 +40,7 @@ def limit_replies(client: HTTPClient, name: str, limit: int) -> HTTPClient:
     async def check(response: Any) -> None:  # noqa: ANN401 - see HTTPClient
         coding = response.headers.get("content-encoding", "identity")
         if coding != "identity":
-            sentence = f"{name}: the server compressed its reply ({coding}), which was not requested"
+            sentence = f"{name}: the server compressed its reply ({coding}); turn off its compression"
             raise ModelError(sentence, may_pass=False)
         response.stream = _limit_stream(response.stream, name, limit)
         if response.has_redirect_location:
@@ -68,7 +68,7 @@ def _error_instead_of_stream(name: str, body: bytes) -> ModelError:
     if isinstance(reply, dict) and reply.get("choices") is None:
         return error_in_reply(name, reply.get("error") or reply)
     return model_error(
-        name, "the server sent its reply in one piece; only streams are supported", may_pass=False
+        name, "the server sent its reply in one piece, but only streams are supported", may_pass=False
     )
 
 
@@ -103,7 +103,7 @@ def without_proxy(url: str | None) -> AbstractContextManager[None]:
 
 
 def mention_proxy(error: ModelError, url: str | None) -> ModelError:
-    """Add the proxy that requests to `url` go through, if any, to an error's sentence. Return the error."""
+    """Name the proxy that requests to `url` use, if any, in the error's sentence. Return the same error."""
     parts = urlsplit(url or "https://provider.invalid")
     host = parts.hostname or ""
     proxies = getproxies()

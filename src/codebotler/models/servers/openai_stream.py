@@ -14,7 +14,7 @@ FAILURE_REASONS = {"abort", "error", "insufficient_system_resource"}  # finish r
 
 
 class LenientDecoder(SSEDecoder):
-    """A decoder that skips events without data, which the protocol allows, and notes `[DONE]`."""
+    """A decoder that skips events without data. Its `is_done` becomes true after the event `[DONE]`."""
 
     is_done = False
 
@@ -30,7 +30,7 @@ class LenientDecoder(SSEDecoder):
 
 
 def make_lenient(client: OpenAIClient) -> OpenAIClient:
-    """Make a client, and all copies that a library makes of it, decode streams leniently."""
+    """Make a client and its copies accept streams that deviate from the protocol. Return the client."""
     kind = type(client)
     client.__class__ = type(kind.__name__, (kind,), {"_make_sse_decoder": lambda _client: LenientDecoder()})
     return client

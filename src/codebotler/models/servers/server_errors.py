@@ -37,7 +37,7 @@ RETRYABLE_WORDS = re.compile(
 
 
 def model_error(name: str, fault: str | Exception, *, may_pass: bool) -> ModelError:
-    """Build an error from a sentence or an exception, including the original cause."""
+    """Build a model's error from a sentence, or from an exception and its original cause."""
     first: BaseException | None = fault if isinstance(fault, Exception) else None
     while first and first.__cause__:
         first = first.__cause__
@@ -99,7 +99,7 @@ def error_in_reply(name: str, body: object) -> ModelError:
 
 
 def is_filtered(status: int | None, body: object) -> bool:
-    """Whether the server rejected a request because of a content filter."""
+    """Return whether the server rejected a request because of a content filter."""
     return status in {*PROMPT_STATUSES, FORBIDDEN} and FILTER_WORDS.search(str(body)) is not None
 
 

@@ -61,7 +61,7 @@ class Floorplan:
     tables: tuple[XY | None, ...]  # the centre of the table in each room, or None
 
     def corners(self, number: int) -> list[XY]:
-        """Return the corners of the free space on floor `number`, at which a shortest path may turn."""
+        """Return the points of floor `number` where a path may turn: the corners of its free space."""
         table = self.tables[number] if number < len(self.tables) else None
         space = _without(_free(self.floors[number]), table)
         return [corner for ring in (space.exterior, *space.interiors) for corner in ring.coords[:-1]]
@@ -93,7 +93,7 @@ def plan_floor(world: World) -> Floorplan:
     tables = [_table(floors[n], clear[n]) if has_objects else None for n in range(len(rooms))]
     for room, table in zip(rooms, tables, strict=True):
         if room.objects and table is None:
-            raise NotReadyError(f'no table fits into "{room.name}", which has objects; make it larger')
+            raise NotReadyError(f'no table fits into "{room.name}", which has objects; make the room larger')
     return Floorplan(tuple(floors), tuple(stands), tuple(passages), tuple(tables))
 
 
@@ -104,7 +104,7 @@ def _floor(name: str, footprint: Sequence[XY]) -> Polygon:
     passable = _shrink(floor, PASSAGE_DEPTH)
     if floor.geom_type != "Polygon" or passable.geom_type != "Polygon" or passable.is_empty:
         raise NotReadyError(
-            f'"{name}" is too narrow; make its footprint wider than '
+            f'the room "{name}" is too narrow; make its footprint wider than '
             f"{WALL_THICKNESS + 2 * PASSAGE_DEPTH:g} m everywhere, without crossing edges"
         )
     return floor

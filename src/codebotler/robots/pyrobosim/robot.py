@@ -33,7 +33,7 @@ class Pyrobosim(Simulated):
         self._drivable = DrivableWorld(self._world, self.clock)
 
     def resume(self, past: Trace) -> None:
-        """Bring the robot and the world to where they were after the steps of an earlier mission."""
+        """Repeat the successful steps of an earlier mission without delays, to restore its world."""
         super().resume(past)
         self._drivable.put_robot(self._robot.room)
 

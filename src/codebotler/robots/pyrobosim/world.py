@@ -42,10 +42,7 @@ T = TypeVar("T")
 
 
 class DrivableWorld:
-    """A pyrobosim world with tables, and with a robot that can drive.
-
-    Everything is deterministic, since paths are planned on a graph.
-    """
+    """A pyrobosim world with tables and a robot that can drive. Paths are deterministic."""
 
     def __init__(self, world: World, clock: Clock) -> None:
         plan = plan_floor(world)
@@ -70,7 +67,7 @@ class DrivableWorld:
 
     @property
     def room(self) -> str | None:
-        """The room the robot is in, or None if it is between rooms."""
+        """The name of the room that the robot is in, or None if the robot is between rooms."""
         pose = self.robot.get_pose()
         return next((name for name, floor in self._rooms.items() if floor.is_inside(pose)), None)
 
@@ -79,11 +76,11 @@ class DrivableWorld:
         self.robot.set_pose(self._pose(room))
 
     def drive(self, room: str, feedback: Feedback) -> None:
-        """Drive to the robot's stopping position in a room."""
+        """Drive to the stopping position in a room. Raise CancelledError or RobotError if the drive fails."""
         self._navigate(self._pose(room), feedback, "GoToInvalidLocation", f'drive to "{room}"')
 
     def approach_table(self, room: str, skill: str, thing: str, feedback: Feedback) -> None:
-        """Drive to the table in a room to pick or place a thing."""
+        """Drive to the table in a room to pick or place a thing. Raise RobotError if this is impossible."""
         kind, action = f"{skill.capitalize()}Failed", f'{TABLE_ACTIONS[skill]} "{thing}"'
         table = self._tables.get(room)
         if table is None:
@@ -168,7 +165,7 @@ class Motor(PathExecutor):
         self.feedback: Feedback = ignore_feedback
 
     def execute(self, path: Path, *_: float, **__: float) -> ExecutionResult:
-        """Follow a path to its end, or until the clock is stopped."""
+        """Follow a path, and return SUCCESS at its end, or CANCELED if the clock is stopped."""
         speed, began = self.clock.speed, self.clock.now
         way = get_constant_speed_trajectory(path, METRES_PER_SECOND, RADIANS_PER_SECOND)
         if speed is not None:
@@ -189,5 +186,5 @@ class Motor(PathExecutor):
 
 
 def _expect_added(part: T | None) -> T:
-    assert part is not None, "pyrobosim accepts the floor plan"
+    assert part is not None, "pyrobosim rejected a part of the floor plan"
     return part

@@ -23,7 +23,7 @@ from codebotler.robots.reservation import robot_file
 from codebotler.robots.ros.connections.connection import Connection, SkillCall, Values, default_connection
 from codebotler.robots.ros.worker import RosWorker, WorkerMessage
 
-NOT_CANCELLED = f"its goals could not be cancelled: {STOP_BY_HAND}"
+NOT_CANCELLED = f"the robot's goals could not be cancelled: {STOP_BY_HAND}"
 CANCEL_SECONDS = 1.0  # the time limit for the worker to send a cancel
 NAMED_ERROR = re.compile(r"([A-Z][A-Za-z]+): (.+)", re.DOTALL)
 
@@ -44,13 +44,13 @@ class RosCaller:
         name: the kind of robot, such as ros2.
         address: the robot's address, such as the URI of a ROS master.
         script: the worker's script: the name of a file in `workers/`, or a path.
-        options: the options for opening the robot. A speed other than 1 must match the virtual robot's.
+        options: the options for opening the robot. A speed other than 1 must equal the virtual robot's.
         environment: additional environment variables for the worker.
         waits: the time limits.
         node: the name of the worker's node, which must be unique on the ROS graph.
     """
 
-    if_tool_dies = "the worker then cancels the robot's goal, unless it was killed as well"
+    if_tool_dies = "the worker then cancels the robot's goal, unless the worker was killed as well"
     rooms_are_regexes = False
 
     def __init__(
@@ -79,7 +79,7 @@ class RosCaller:
         self._rescue_lock = threading.RLock()
 
     def connect(self) -> None:
-        """Start a worker after `disconnect`, wait for the action servers, and set the clock to 0.
+        """Start a worker, wait for the robot's servers, and set the clock to 0. Call `disconnect` before.
 
         Raises:
             NotReadyError: ROS, the master or all servers are missing, or another process uses the robot.
@@ -153,7 +153,7 @@ class RosCaller:
             return self._worker, self._number
 
     def cancel(self) -> None:
-        """Have the worker cancel the goal. If it hangs or is gone, have a new one cancel all goals."""
+        """Have the worker cancel the goal. If the worker hangs or is dead, a new one cancels all goals."""
         has_lock = self._send_lock.acquire(timeout=CANCEL_SECONDS)  # a hanging worker can block its owner
         try:
             self._stopped = True
@@ -210,7 +210,7 @@ class RosCaller:
         try:
             other = self._start(cancel_all=True)
         except NotReadyError as error:
-            return f"its goals could not be cancelled ({error.sentence}): {STOP_BY_HAND}"
+            return f"the robot's goals could not be cancelled ({error.sentence}): {STOP_BY_HAND}"
         other.leave()
         if not other.about["cancelled_all"]:
             return NOT_CANCELLED
@@ -219,7 +219,7 @@ class RosCaller:
 
 
 def calls_data(connection: Connection) -> WorkerMessage:
-    """Return the calls of a connection by skill, as plain data for a worker."""
+    """Return the kind, server, type and definition of each call of a connection, by skill, for a worker."""
     return {
         skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
         for skill, call in connection.calls.items()

@@ -18,9 +18,9 @@ EMPTY_MASK = ((0.0, 0.0), (MASK_RESOLUTION, MASK_RESOLUTION))  # one free cell, 
 def keepout_messages(
     rules: Sequence[Rule], rooms: Sequence[Room], frame: str = "map", topic: str = "/keepout_filter_mask"
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Build the keepout mask (a nav_msgs/OccupancyGrid) and its nav2_msgs/CostmapFilterInfo.
+    """Return a keepout mask (nav_msgs/OccupancyGrid) and its nav2_msgs/CostmapFilterInfo as plain data.
 
-    Only rules of the form `always: not tr.Exists(inside(...))` have an effect. `frame` is that of the rooms.
+    Only rules of the form `always: not tr.Exists(inside(...))` count. `frame` is the frame of the rooms.
     """
     patterns = [element for rule in rules if rule.when == "always" for element in _forbidden(rule.formula)]
     zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in patterns)]

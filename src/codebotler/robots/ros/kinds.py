@@ -30,7 +30,7 @@ INSTALL_ROS2 = "pip install 'codebotler[ros2]'"
 def ros1(options: Options, waits: Timeouts | None = None) -> RosRobot:
     """Create a robot on ROS 1, whose worker runs actionlib under the robot's Python.
 
-    Its address is the URI of a master, by default ROS_MASTER_URI.
+    Its address is the URI of a master, by default ROS_MASTER_URI. Raise UserError if the URI is invalid.
     """
     uri = master_uri(options.address)
     return RosRobot("ros1", uri, "ros1_worker.py", options, {"ROS_MASTER_URI": uri}, waits=waits)
@@ -39,7 +39,7 @@ def ros1(options: Options, waits: Timeouts | None = None) -> RosRobot:
 def ros2(options: Options, waits: Timeouts | None = None) -> RosRobot:
     """Create a robot on ROS 2, whose worker runs rclpy under the system's Python or CodeBotler's own.
 
-    Its address is a domain number, by default ROS_DOMAIN_ID or else 0.
+    Its address is a domain number, by default ROS_DOMAIN_ID or else 0. Raise UserError if it is no number.
     """
     domain = domain_of(options.address)
     options = replace(options, ros_python=choose_python(options.ros_python))
@@ -49,7 +49,7 @@ def ros2(options: Options, waits: Timeouts | None = None) -> RosRobot:
 def rosbridge(options: Options, waits: Timeouts | None = None) -> RosRobot:
     """Create a robot behind a rosbridge server, which gives access to ROS over a websocket.
 
-    Its worker uses CodeBotler's Python, so no ROS is needed here. The default server is on this machine.
+    Its worker uses CodeBotler's Python, so this machine needs no ROS. The default is ws://localhost:9090.
     """
     options = replace(options, ros_python=Path(sys.executable))
     address = options.address or ROSBRIDGE_ADDRESS
@@ -57,7 +57,7 @@ def rosbridge(options: Options, waits: Timeouts | None = None) -> RosRobot:
 
 
 def master_uri(address: str = "") -> str:
-    """Return the given master URI, ROS_MASTER_URI, or the default. Raise UserError if it is invalid."""
+    """Return `address`, or else ROS_MASTER_URI, or else the default URI. Raise UserError if it is invalid."""
     uri = address or os.environ.get("ROS_MASTER_URI") or MASTER_URI
     try:
         parts = urlsplit(uri)
@@ -70,7 +70,7 @@ def master_uri(address: str = "") -> str:
 
 
 def domain_of(address: str = "") -> str:
-    """Return the given domain, or else ROS_DOMAIN_ID, or else 0. Raise UserError if it is not a number."""
+    """Return `address`, or else ROS_DOMAIN_ID, or else 0. Raise UserError if it is not a number."""
     domain = address or os.environ.get("ROS_DOMAIN_ID") or "0"
     if not domain.isdecimal():
         raise UserError(f'"{domain}" is not a ROS_DOMAIN_ID; write a number such as 0')
@@ -78,14 +78,14 @@ def domain_of(address: str = "") -> str:
 
 
 def choose_python(named: Path = ROS_PYTHON) -> Path:
-    """Return the interpreter the user named, the system's if it has ROS 2, or else CodeBotler's own."""
+    """Return `named`, or CodeBotler's own Python if `named` is the default and only our own has ROS 2."""
     if named != ROS_PYTHON or find_spec("rclpy") is None:
         return named
     return named if find_missing(named, ROS2_MODULES) == [] else Path(sys.executable)
 
 
 def ros_readiness(name: str, python: Path = ROS_PYTHON) -> Readiness:
-    """Check whether an interpreter has the modules for ros1 or ros2. Message types are built later."""
+    """Return whether `python` has the modules for `name`, ros1 or ros2. Message types are built later."""
     if name == "ros1":
         needs: Sequence[str] = ROS1_MODULES
         mend, see = INSTALL_ROS1, "needs a master, see ROS_MASTER_URI"

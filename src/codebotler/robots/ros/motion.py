@@ -49,23 +49,23 @@ class Motion:
 
     @property
     def is_still(self) -> bool:
-        """Whether recent reports show that the robot stands still."""
+        """Whether the robot has sent reports in the last 0.5 s, and none of them shows a movement."""
         now = time.monotonic()
         return self._last_report > now - STILL_SECONDS > self._last_move
 
     @property
     def is_unseen(self) -> bool:
-        """Whether the robot's pose is outdated, because its velocities show that it has moved since."""
+        """Whether the last pose is outdated: the robot has moved more than 1 metre or 1 radian since then."""
         return self._unseen > MAX_UNSEEN
 
     @property
     def is_silent(self) -> bool:
-        """Whether there were no recent reports. AMCL, for example, is silent while a robot stands still."""
+        """Whether there was no report for 1 s. AMCL, for example, is silent while a robot stands still."""
         return self._last_report < time.monotonic() - 2 * STILL_SECONDS
 
     @property
     def is_moving(self) -> bool:
-        """Whether recent reports show that the robot moves."""
+        """Whether a report of the last 0.5 s shows that the robot moves."""
         return self._last_move > time.monotonic() - STILL_SECONDS
 
 

@@ -37,9 +37,9 @@ CLOSE_SECONDS = 1.0  # how long to wait for detectors to close; a busy detector 
 
 
 class RosRobot(RosCaller):
-    """Performs skills with the calls, places and cameras of `options.connection`, or else with actions.
+    """A robot on ROS with the calls, places and cameras of `options.connection`, or an action for each skill.
 
-    After a stop, the robot's pose or velocity shows whether it really stands still.
+    After a stop, `failed_stop` uses the robot's pose or velocity to tell whether it really stands still.
     """
 
     _detectors: Mapping[str, Detector] = MappingProxyType({})  # by model, while the robot is connected
@@ -61,7 +61,7 @@ class RosRobot(RosCaller):
         places, pose = self.connection.places, self._pose() if self.has_pose else None
         sentence = ""
         if self.has_pose and pose is None:
-            sentence = f"no pose arrived on {self.connection.pose}; start its publisher, or correct its name"
+            sentence = f"no pose arrived on {self.connection.pose}; start its publisher, or correct the topic"
         elif places is not None and pose is not None and pose.frame not in {"", places.frame}:
             sentence = (
                 f'the poses on {self.connection.pose} are in the frame "{pose.frame}", but the places are in '
@@ -95,17 +95,17 @@ class RosRobot(RosCaller):
 
     @property
     def failed_stop(self) -> str:
-        """A message if the robot is known to move after a stop, otherwise ""."""
+        """A message if the robot moves some seconds after a stop; "" if it is still or reports nothing."""
         worker, until = self._worker, time.monotonic() + self._waits.patience * 0.8
         if worker is None or not (self.connection.pose or self.connection.velocity):
             return ""
         motion = worker.motion
         while not motion.is_still and not motion.is_silent and time.monotonic() < until:
             time.sleep(POLL_SECONDS)
-        return f"it was told to stop but is still moving: {STOP_BY_HAND}" if motion.is_moving else ""
+        return f"the robot was told to stop but is still moving: {STOP_BY_HAND}" if motion.is_moving else ""
 
     def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
-        """Report positions (None if unknown) to a callback until `disconnect`. Return False without poses."""
+        """Pass positions in metres (None if unknown) to `on_pose` until `disconnect`. Return `has_pose`."""
         worker = self._worker
 
         def watch() -> None:

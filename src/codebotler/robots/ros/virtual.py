@@ -72,7 +72,7 @@ class VirtualRobot:
         self._ended = threading.Event()
 
     def start(self) -> bool:
-        """Offer the skills and return whether a master was started. Raise NotReadyError if ROS is missing."""
+        """Offer the skills. Return whether it started a ROS master. Raise NotReadyError if ROS is missing."""
         worker = self._worker = self._start_servers()
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)
@@ -84,7 +84,7 @@ class VirtualRobot:
     def wait(self) -> None:
         """Serve goals until the worker dies, then raise RobotLostError."""
         self._ended.wait()
-        assert self._worker is not None, "the caller has started it"
+        assert self._worker is not None, "the robot was not started"
         raise RobotLostError(f"the virtual robot's worker has died ({self._worker.describe_end()})")
 
     def stop(self) -> None:

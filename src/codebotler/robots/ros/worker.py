@@ -38,6 +38,7 @@ class RosWorker:
 
     It runs in its own session so that Ctrl-C does not end it before it has stopped the robot. If heartbeats
     from this process stop, the worker cancels the goal, since a suspended process cannot react to Ctrl-C.
+    `about` is the worker's message that it is ready, and `motion` the robot's motion.
 
     Args:
         python: the Python interpreter that runs the script.
@@ -71,7 +72,7 @@ class RosWorker:
             )
         except OSError as error:
             raise NotReadyError(
-                f"{python}: {error.strerror}; name the robot's Python with --ros-python"
+                f"{python} does not start: {error.strerror}; name the robot's Python with --ros-python"
             ) from None
         pipes = (self._process.stdin, self._process.stdout, self._process.stderr)
         self._stdin, self._stdout, self._stderr = cast("tuple[IO[str], IO[str], IO[str]]", pipes)
@@ -89,20 +90,20 @@ class RosWorker:
             self._stdin.flush()
 
     def receive(self, seconds: float) -> WorkerMessage | None:
-        """Return the next message, or None if no message arrives within the given seconds."""
+        """Return the next message, or None if no message arrives within `seconds`."""
         try:
             return self._messages.get(timeout=seconds)
         except queue.Empty:
             return None
 
     def cancel(self, seconds: float) -> bool:
-        """Have the worker cancel the goal, and return whether it did so within the given seconds."""
+        """Tell the worker to cancel the goal. Return whether it sent the cancel request within `seconds`."""
         self._cancel_sent.clear()
         self.send({"do": "cancel"})
         return self._cancel_sent.wait(seconds)
 
     def leave(self) -> bool:
-        """End the worker by closing its input. Return False if it failed or had to be killed."""
+        """End the worker by closing its input. Return False if the worker failed or had to be killed."""
         self._leaves.set()
         with self._writing, suppress(OSError):
             self._stdin.close()
@@ -123,7 +124,7 @@ class RosWorker:
         self._close()
 
     def describe_end(self) -> str:
-        """Return the exit status or signal of the worker, and the last line of its error output."""
+        """Return how the worker ended, such as `status 1`, with the last line of its error output, if any."""
         self._process.wait(EXIT_SECONDS)
         status = self._process.returncode
         how = f"signal {-status}" if status < 0 else f"status {status}"
@@ -143,9 +144,9 @@ class RosWorker:
                     raise NotReadyError(text)
                 case {"is": "ended"}:
                     self.kill()
-                    raise NotReadyError(f"the worker of {python} ended at once ({self.describe_end()})")
+                    raise NotReadyError(f"the ROS worker of {python} ended at once ({self.describe_end()})")
         self.kill()
-        raise NotReadyError(f"the worker of {python} was not ready within {READY_SECONDS:g} s")
+        raise NotReadyError(f"the ROS worker of {python} was not ready within {READY_SECONDS:g} s")
 
     def _listen(self) -> None:
         for line in self._stdout:
@@ -182,12 +183,12 @@ class RosWorker:
 
 
 def executable(python: Path) -> str:
-    """Return the command for an interpreter. A bare name is sought in the current folder, then in PATH."""
+    """Return the command for an interpreter. A bare name is looked up in the current folder, then in PATH."""
     return str(python.absolute() if python.exists() else python)
 
 
 def outer_environment() -> dict[str, str]:
-    """Return the environment without the changes that ROS from wheels makes for this interpreter."""
+    """Return the environment variables without the changes that ROS from wheels made for this process."""
     environment = dict(os.environ)
     if environment.pop(WHEELS_MARK, None) is not None:
         folders = environment.get("LD_LIBRARY_PATH", "").split(os.pathsep)
@@ -197,7 +198,7 @@ def outer_environment() -> dict[str, str]:
 
 
 def find_missing(python: Path, modules: Sequence[str]) -> list[str] | None:
-    """Return the modules that an interpreter lacks, without importing any, or None if it cannot run."""
+    """Return those modules that an interpreter lacks, or None if the interpreter cannot be run."""
     code = "import sys, importlib.util as u; print(*(m for m in sys.argv[1:] if u.find_spec(m) is None))"
     try:
         done = subprocess.run(  # noqa: S603 - the interpreter that the user names

@@ -40,7 +40,7 @@ class SkillCall:
     failure: str = ""  # the kind of error for failures that do not specify one
 
     def fields(self, values: Values) -> Any:  # noqa: ANN401 - a message
-        """Return the request with variables such as `$place.x` replaced by values."""
+        """Return the request with each variable, such as `$place.x`, replaced by its value in `values`."""
         return _fill(self.request, values)
 
     def answer(self, received: Values) -> Any:  # noqa: ANN401 - a mission checks its type
@@ -53,14 +53,12 @@ class SkillCall:
             raise RobotError(self.failure, str(error.args[0])) from None
 
     def why(self, received: Values) -> str:
-        """Return the reason and the error code that a message contains, or an empty string."""
+        """Return why the skill failed, with an error code if there is one, or "" if it is unknown."""
         if self.reason:
             with suppress(LookupError):
                 return str(_get(received, self.reason))
-        words = next(
-            (text for name in REASON_FIELDS if isinstance(text := received.get(name), str) and text), ""
-        )
-        code = received.get("error_code")
+        texts = (text for name in REASON_FIELDS if isinstance(text := received.get(name), str) and text)
+        words, code = next(texts, ""), received.get("error_code")
         return f"{words} (error {code})".strip() if code else words
 
 
@@ -72,12 +70,12 @@ class Connection:
         calls: the action, service or topic for each skill.
         robot: the kind of robot: ros1, rosbridge or ros2.
         places: the places that the robot can drive to, or None if unknown.
-        pose: the topic with the robot's poses, or an empty string.
-        velocity: the topic with the robot's velocities, or an empty string.
-        frames: the frames of the map and of the robot, for poses from tf.
+        pose: the topic with the robot's poses, or "" if there is none.
+        velocity: the topic with the robot's velocities, or "" if there is none.
+        frames: the frames of the map and of the robot if poses come from tf, else None.
         packages: folders of message packages to build if they are not installed.
         cameras: the camera topic and the detector model for each skill that looks at pictures.
-        keepout: the topics of Nav2's keepout mask and its CostmapFilterInfo.
+        keepout: the topics of Nav2's keepout mask and its CostmapFilterInfo, or None.
     """
 
     calls: Mapping[str, SkillCall]

@@ -99,7 +99,7 @@ def read_connection(path: Path, skills: SkillTable) -> Connection:
     folders = tuple(str((path.parent / folder).resolve()) for folder in form.packages)
     for number, folder in enumerate(folders):
         if not Path(folder).is_dir():
-            raise file.wrong(f"there is no folder {folder}", "packages", number)
+            raise file.wrong(f"there is no folder {folder}; correct the path", "packages", number)
     if form.keepout is not None and (form.robot != "ros2" or places is None):
         raise file.wrong("keepout needs places and Nav2; add places, and use robot: ros2", "keepout")
     tf = None if form.pose is None else form.pose.tf
@@ -119,9 +119,10 @@ def read_connection(path: Path, skills: SkillTable) -> Connection:
 
 def _camera(file: YamlFile, name: str, form: SkillForm, skill: Skill) -> tuple[str, str]:
     if form.image is None or form.detector is None:
-        raise file.wrong('a detector also needs "image", a camera topic; add it', "skills", name)
+        raise file.wrong('a detector needs "image", the topic of a camera; add it', "skills", name)
     if skill.returns.annotation != "bool" or len(skill.parameters) != 1:
-        raise file.wrong(f"a detector cannot perform {skill.signature}", "skills", name, "detector")
+        sentence = f"{skill.signature} cannot use a detector; it needs one parameter and the result type bool"
+        raise file.wrong(sentence, "skills", name, "detector")
     return form.image, form.detector
 
 
@@ -150,7 +151,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     try:
         SkillCall("topic", "", "", request).fields(dict.fromkeys(known, ""))
     except (AttributeError, TypeError):
-        raise file.wrong("a path gives both a value and subfields", *at, MESSAGE_KEYS[kind]) from None
+        raise file.wrong("a path has a value and subfields; remove one", *at, MESSAGE_KEYS[kind]) from None
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
     whole, ros = _full_type(kind, form.type), skill.ros
     is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"

@@ -50,7 +50,7 @@ NOT_SKILLS = ("pose", "velocity")
 
 
 def discover_offers(address: str, python: Path) -> list[str]:
-    """List what a robot's nodes offer as "KIND NAME TYPE". KIND is action, service, hears or sends.
+    """Return what nodes offer as "KIND NAME TYPE". KIND is action, service, or hears or sends (a topic).
 
     Args:
         address: a ROS 2 domain number, or "" for the default.
@@ -65,13 +65,13 @@ def discover_offers(address: str, python: Path) -> list[str]:
     worker.leave()
     if not worker.about["offers"]:
         raise NotReadyError(
-            f"no node was found with ROS_DOMAIN_ID {domain}; start the robot, or give its --address"
+            f"no node was found with ROS_DOMAIN_ID {domain}; start the robot, or set another --address"
         )
     return [" ".join(offer) for offer in worker.about["offers"]]
 
 
 def draft_connection(offers: Iterable[str]) -> str:
-    """Draft a file for `--connect` from offers. Lines to complete and unused offers become comments."""
+    """Return a draft of a `--connect` file for offers. Lines to complete and unused offers are comments."""
     known = [
         offer
         for offer in sorted(offers)

@@ -19,7 +19,7 @@ WRITE_SECONDS = 1.0  # the time limit for writing the last lines
 
 
 class SetupError(Exception):
-    """Raised when the robot cannot be used. The text says why and how to fix that."""
+    """Raised when the robot cannot be used. The text says why, and how to fix the problem."""
 
 
 class Channel:
@@ -36,11 +36,11 @@ class Channel:
         self.last_sign = float("inf")  # when the last line arrived; infinite while the line is handled
 
     def send(self, kind: str, **more: Any) -> None:
-        """Queue a message to CodeBotler. If CodeBotler has died, `lines` ends."""
+        """Queue a message of a kind such as `ready`, with more fields. It is lost if CodeBotler has died."""
         self._lines.put(json.dumps({"is": kind, **more}, default=str) + "\n")
 
     def finish(self) -> None:
-        """Wait until all queued lines are written, but only for a short time."""
+        """Wait until all queued messages are written, but at most 1 second."""
         self._lines.put(None)
         self._writer.join(WRITE_SECONDS)
 
@@ -77,7 +77,7 @@ def serve(make_worker: Callable[[Channel, Fields], Any]) -> None:
             channel.send("not-ready", text=str(error))
             return
         except ImportError as error:
-            channel.send("not-ready", text=f"{sys.executable} has no ROS: {error}")
+            channel.send("not-ready", text=f"{sys.executable} has no ROS: {error}; source ROS")
             return
         for line in lines:
             worker.obey(line)

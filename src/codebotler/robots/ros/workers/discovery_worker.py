@@ -25,7 +25,7 @@ class DiscoveryWorker:
 
 
 def find_offers() -> set[Offer]:
-    """Collect the actions, services and topics of all other nodes until no new ones appear."""
+    """Return the actions, services and topics of all other nodes, once no new ones appear."""
     import rclpy
 
     rclpy.init(args=None)

@@ -58,7 +58,7 @@ class Server:
         self.type: str = call["type"]
 
     def last_sign(self) -> float:
-        """Return when the server last showed that it is alive, or the current time if this is not tracked."""
+        """Return the monotonic time of the last sign of life, or the current time if this is not tracked."""
         return time.monotonic()
 
     def has_pictures(self) -> bool:
@@ -66,7 +66,7 @@ class Server:
         return False
 
     def cancel(self) -> None:
-        """Cancel all goals of all clients."""
+        """Cancel all goals of all clients. Servers that have no goals ignore this."""
 
 
 class SkillWorker:
@@ -163,7 +163,7 @@ class SkillWorker:
         self.graph.leave()
 
     def stop(self) -> None:
-        """Cancel the current goal, and wait for its end for a short time."""
+        """Cancel the current goal, and wait up to 1 second for its end."""
         goal = self.goal
         if goal is not None and not goal.is_over:
             goal.cancel()
@@ -172,7 +172,7 @@ class SkillWorker:
             time.sleep(WATCH_SECONDS)  # ROS sends messages in its own threads
 
     def missing(self) -> dict[str, str]:
-        """Return messages that explain which servers cannot be reached, by skill."""
+        """Return a message for each skill whose server cannot be reached, by skill."""
         self.wait_for_servers()
         return {
             skill: self.graph.explain_missing(server.name, server.type)
@@ -206,7 +206,7 @@ class SkillWorker:
             self.end(goal, "lost", text=fault)
 
     def end(self, goal: Goal, kind: str, **more: Any) -> None:
-        """Report the end of a goal, but only the first time."""
+        """Report the end of a goal with a message of `kind`, such as `result`. Ignore any later end."""
         with goal.lock:
             if goal.is_over:
                 return
@@ -219,7 +219,7 @@ class SkillWorker:
         goal.end_event.set()
 
     def pass_on(self, goal: Goal, feedback: dict[str, Any]) -> None:
-        """Report the text and number fields of a feedback message, at a limited rate."""
+        """Report the text and number fields of a feedback message, at most twice a second."""
         plain = {name: value for name, value in feedback.items() if not isinstance(value, (dict, list))}
         text = ", ".join(
             f"{name}: {value:.4g}" if isinstance(value, float) else f"{name}: {value}"

@@ -77,7 +77,7 @@ class Ros1Graph:
         return f"another node called {self.node} has taken over; stop it, and connect again"
 
     def nodes_of(self, server: str) -> list[str]:
-        """Return the nodes registered for an action, a topic or a service, even if they are dead."""
+        """Return the names of nodes registered for an action, a topic or a service, even if they are dead."""
         _, subscribers, services = self._master.getSystemState()
         name = self._rosgraph.names.resolve_name(server, self.node)
         return [
@@ -92,7 +92,7 @@ class Ros1Graph:
     def explain_missing(self, server: str, type_name: str) -> str:
         """Return a message that explains why a server cannot be reached."""
         if not self.is_online():
-            return f"{server} is gone, and so is the ROS master at {self.uri}; start it again"
+            return f"{server} is gone, and so is the ROS master at {self.uri}; start both again"
         if self.address_of(self.node) is None:
             return f"the ROS master at {self.uri} was restarted; connect again"
         nodes = self.nodes_of(server)
@@ -113,7 +113,7 @@ class Ros1Graph:
 
 
 def no_master(uri: str) -> str:
-    """Return a message that says that no master answers and what to do."""
+    """Return the message for a ROS master that does not answer at the address `uri`."""
     return f"no ROS master answers at {uri}; start one (roscore), or set ROS_MASTER_URI"
 
 

@@ -62,7 +62,7 @@ def as_data(value: Any) -> Any:
 
 
 def parts_of(kind: str) -> tuple[str, str]:
-    """Split a type such as std_msgs/msg/String into its package, by default our own, and its name."""
+    """Return the package and the name of a type such as std_msgs/String. The default package is our own."""
     *package, name = kind.split("/")
     return package[0] if package else OWN_PACKAGE, name
 
@@ -73,7 +73,7 @@ def offer_of(kind: str) -> str:
 
 
 def generate_type(kind: str, text: str) -> Any:
-    """Generate a message type from its full text, which includes the types of its fields."""
+    """Generate the message type `kind` from its full text, which includes the types of its fields."""
     from genpy.dynamic import generate_dynamic
 
     spec = generate_dynamic(kind, text)[kind]

@@ -26,7 +26,7 @@ class MotionReports:
         self._last_sent = {"pose": 0.0, "velocity": 0.0}
 
     def report_pose(self, message: Fields) -> None:
-        """Report the pose in a message, if the message contains one or completes the transforms."""
+        """Report the robot's pose if the message contains it, or completes the transforms that give it."""
         found = self._transform(message) if self._frames else _pose_in(message)
         if found is not None:
             frame, (x, y, yaw) = found
@@ -41,7 +41,7 @@ class MotionReports:
             self._send("velocity", speed=max(math.hypot(linear["x"], linear["y"]), abs(angular["z"])))
 
     def _transform(self, message: Fields) -> tuple[str, Turn] | None:
-        assert self._frames is not None, "the caller has frames"
+        assert self._frames is not None, "the frames are not known"
         for each in message["transforms"]:
             turn = _turn(each["transform"]["translation"], each["transform"]["rotation"])
             parent = each["header"]["frame_id"].lstrip("/")

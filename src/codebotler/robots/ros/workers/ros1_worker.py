@@ -39,7 +39,7 @@ class Ros1Server(Server):
         )
 
     def last_sign(self) -> float:
-        """Return when the server last sent its status."""
+        """Return the monotonic time of the server's last status message, or 0 before the first."""
         return self._last_status
 
     def has_pictures(self) -> bool:
@@ -47,7 +47,7 @@ class Ros1Server(Server):
         return bool(self._pictures.get_num_connections())
 
     def is_connected(self, silence: float) -> bool:
-        """Return whether our goals reach the server and its results reach us."""
+        """Return whether goals and results get through, and the last status is at most `silence` s old."""
         client, node = self.client, self._node
         if node is None or time.monotonic() - self._last_status > silence:
             return False
@@ -63,7 +63,7 @@ class Ros1Server(Server):
         )
 
     def cancel(self, goal_id: str = "") -> None:
-        """Cancel one goal, or all goals of all clients.
+        """Cancel one goal, or all goals of all clients if `goal_id` is empty.
 
         The `cancel` method of actionlib would report a goal as lost if it has not reached the server yet.
         """
@@ -119,7 +119,7 @@ class Ros1Topic(Server):
 
 
 def subscribe(topic: str, hear: Callable[[Fields], object]) -> Any:
-    """Subscribe to a topic with its publisher's type, and pass each message to `hear` as plain data."""
+    """Pass the messages of a topic, of any type, to `hear` as plain data. Return the rospy subscriber."""
     import rospy
 
     known: dict[str, Any] = {}
@@ -159,7 +159,7 @@ class Ros1Worker(SkillWorker):
     ) -> Callable[[], object]:
         """Subscribe to a topic, as `SkillWorker.listen` describes."""
         if is_needed and not self.graph.has_publisher(topic):
-            raise SetupError(f"nothing publishes {topic}; start its publisher, or correct its name")
+            raise SetupError(f"nothing publishes {topic}; start its publisher, or correct the topic")
         unsubscribe: Callable[[], object] = subscribe(topic, hear).unregister
         return unsubscribe
 
@@ -199,7 +199,7 @@ class Ros1Worker(SkillWorker):
             return
         terminal, text = handle.get_terminal_state(), handle.get_goal_status_text()
         if terminal == TerminalState.LOST:
-            text = f"{goal.server.name} no longer knows its goal; was it restarted?"
+            text = f"{goal.server.name} no longer knows its goal; was the server restarted?"
         self.finish(goal, ROS1_ENDS[terminal], as_data(handle.get_result()), text)
 
     def _perform(self, goal: Goal, message: Any) -> None:

@@ -122,7 +122,7 @@ class Ros2Graph:
             if time.monotonic() > deadline:
                 if patience is None:
                     return None
-                raise SetupError(f"nothing publishes {topic}; start its publisher, or correct its name")
+                raise SetupError(f"nothing publishes {topic}; start its publisher, or correct the topic")
             time.sleep(0.05)
         kind, offered = publishers[0].topic_type, publishers[0].qos_profile
         qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -73,7 +73,8 @@ def message_types(
         if not all(definitions.values()):
             if package not in sources:
                 raise SetupError(
-                    f"the ROS 2 package {package} is not installed; source it, or list its folder in packages"
+                    f"the ROS 2 package {package} is not installed; "
+                    "source its workspace, or list its folder in packages"
                 )
             definitions.update(_definitions(sources[package], [*definitions]))
         sys.path.insert(0, str(build_package(package, definitions, tell)))
@@ -153,7 +154,7 @@ def _import_class(name: str) -> Any:
     except (AttributeError, ModuleNotFoundError):
         where = Path(importlib.import_module(package).__file__ or "").parent
         raise SetupError(
-            f"{package} in {where} has no {kind} {plain}; add {plain}.{kind} and build it again"
+            f"{package} in {where} has no {kind} {plain}; add {plain}.{kind} and build the package again"
         ) from None
 
 
@@ -185,7 +186,7 @@ def build_package(package: str, definitions: Definitions, tell: ProgressListener
         shares = {name: Path(share(name)) for name in (*needed, *("rosidl_" + name for name in GENERATORS))}
     except PackageNotFoundError as error:
         raise SetupError(
-            f"{package} needs the ROS 2 package {error}, which is not installed; source it"
+            f"{package} needs the ROS 2 package {error}, which is not installed; source its workspace"
         ) from None
     versions = [(folder / "package.xml").read_text() for folder in shares.values()]
     parts = [package, definitions, sysconfig.get_config_var("SOABI"), versions, Path(__file__).read_text()]

@@ -59,7 +59,7 @@ class Ros2Server(Server):
         self.has_cancelled = False
 
     def last_sign(self) -> float:
-        """Return the current time if the server is on the graph, else 0. DDS removes dead servers late."""
+        """Return the monotonic time if the server is on the graph, else 0. DDS removes dead servers late."""
         return time.monotonic() if self.client.server_is_ready() else 0.0
 
     def is_connected(self, _silence: float) -> bool:
@@ -79,7 +79,7 @@ class Ros2Server(Server):
             self.has_cancelled = True
 
     def request_cancel(self, number: list[int]) -> Any:
-        """Request to cancel a goal, or ALL_GOALS, and return a future. Call this in the executor's thread."""
+        """Cancel the goal with this id, or ALL_GOALS. Return a future. Call this in the executor's thread."""
         request = self._request()
         request.goal_info.goal_id.uuid = number
         return self._cancels.call_async(request)
@@ -128,7 +128,7 @@ class Ros2Worker(SkillWorker):
     """Performs skills over ROS 2."""
 
     graph: Ros2Graph
-    silence_says = "it has left the graph; DDS reports a killed process only after its lease, by default 20 s"
+    silence_says = "the server has left the graph; DDS reports a killed process late, by default after 20 s"
 
     def connect(self, start: Fields) -> bool:
         """Start our node and a client for each server. Return whether a dead worker left its node behind."""
@@ -170,7 +170,7 @@ class Ros2Worker(SkillWorker):
         return not waiting
 
     def wait_for_servers(self) -> None:
-        """Wait as long as new servers keep appearing on the graph."""
+        """Wait until all servers are on the graph, or no new one has appeared for a while."""
         start = change = time.monotonic()
         found, has_reported = 0, False
         while found < len(self.servers) and not self.graph.has_left():
@@ -213,7 +213,7 @@ class Ros2Worker(SkillWorker):
         self.channel.send("progress", text=text)
 
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
-        """Repeat requests, because a cancel can arrive before its goal, and an answer can get lost."""
+        """Check a goal, and repeat requests: a cancel can overtake its goal, and an answer can get lost."""
         super().look_after(goal, sent, now)
         if goal.is_over or goal.handle is None:  # calls of services and topics have no handle
             return
@@ -249,7 +249,7 @@ class Ros2Worker(SkillWorker):
             self.end(goal, "cancelled" if goal.cancelled else "error", state="rejected", text="")
 
     def update_status(self, server: Ros2Server, statuses: Any) -> None:
-        """Process the status messages of a server, as far as they are about the current goal."""
+        """Process those statuses from a server that are about the current goal."""
         goal = self.goal
         if goal is None or goal.is_over or goal.handle is None or goal.server is not server:
             return
@@ -287,7 +287,7 @@ class Ros2Worker(SkillWorker):
 
     def _finish_goal(self, goal: Goal, response: Any) -> None:
         if goal.cancelled is None and response.status not in ROS2_ENDS:
-            why = f"{goal.server.name} ended its goal with the status {response.status}"
+            why = f"{goal.server.name} ended its goal with the unexpected status {response.status}"
             self.end(goal, "lost", text=why)
         else:
             self.finish(goal, ROS2_ENDS.get(response.status, "cancelled"), as_data(response.result))
@@ -298,7 +298,7 @@ def _check_sendable(message: Any, fields: Fields) -> None:
     from rclpy.serialization import serialize_message
 
     if r"\x00" in repr(fields).replace(r"\\", ""):  # ROS 2 truncates strings at NUL
-        raise ValueError("a string contains NUL")
+        raise ValueError("a string contains the character NUL; remove it")
     serialize_message(message)
 
 

@@ -34,7 +34,7 @@ RECALLED = 7
 
 @dataclass(frozen=True)
 class GoalUpdate:
-    """News about a goal, or, if `goal` is empty, a status message that only shows that a server is alive."""
+    """News about a goal. If `goal` is empty, the update only shows that the server is alive."""
 
     goal: str  # the goal id, or an empty string
     what: str  # status (which implies that the server has accepted the goal), feedback or ended
@@ -62,12 +62,12 @@ class Ros1Protocol:
             yield {"op": op, "topic": f"{server}/{name}", "type": of}
 
     def goal(self, server: str, _action: str, goal: str, fields: Fields) -> Fields:
-        """Return the message for a goal, which may be sent again because servers accept an id only once."""
+        """Return the message for the goal with id `goal`. Servers ignore a repeated id."""
         msg = {"goal_id": {"id": goal, "stamp": NO_STAMP}, "goal": fields}
         return {"op": "publish", "topic": f"{server}/goal", "msg": msg}
 
     def cancel(self, server: str, goal: str) -> Fields:
-        """Return the message that cancels a goal, or all goals if the id is empty."""
+        """Return the message that cancels the goal with the id `goal`, or all goals if the id is empty."""
         return {"op": "publish", "topic": f"{server}/cancel", "msg": {"id": goal, "stamp": NO_STAMP}}
 
     def updates(self, message: Fields) -> Iterator[GoalUpdate]:
@@ -99,7 +99,7 @@ class Ros2Protocol:
         yield from ()
 
     def goal(self, server: str, action: str, goal: str, fields: Fields) -> Fields:
-        """Return the message for a goal, with a request for feedback."""
+        """Return the message that sends the goal with the id `goal` and requests feedback."""
         return {
             "op": "send_action_goal",
             "id": goal,
@@ -110,7 +110,7 @@ class Ros2Protocol:
         }
 
     def cancel(self, server: str, goal: str) -> Fields:
-        """Return the message that cancels a goal."""
+        """Return the message that cancels the goal with the id `goal`."""
         return {"op": "cancel_action_goal", "id": goal, "action": server}
 
     def updates(self, message: Fields) -> Iterator[GoalUpdate]:
@@ -137,7 +137,7 @@ ActionProtocol: TypeAlias = Ros1Protocol | Ros2Protocol
 
 
 class RosbridgeConnection:
-    """Sends messages, and runs a thread that passes goal updates to `hear` and calls `lost` when it ends."""
+    """A connection whose thread passes goal updates to `hear`, and calls `lost` if the connection ends."""
 
     def __init__(
         self,
@@ -185,7 +185,7 @@ class RosbridgeConnection:
         return unsubscribe
 
     def insist(self, message: Fields) -> bool:
-        """Send a message repeatedly over a new connection, and return whether this was possible."""
+        """Send a message again and again over a new connection for 3 s. Return whether it was ever sent."""
         deadline, is_sent = time.monotonic() + INSIST_SECONDS, False
         while time.monotonic() < deadline:
             with (
@@ -203,7 +203,7 @@ class RosbridgeConnection:
         return is_sent
 
     def leave(self) -> None:
-        """Close the connection."""
+        """Close the connection without calling `lost`."""
         self._lost = lambda: None
         self._socket.close()
 
@@ -228,7 +228,7 @@ class RosbridgeConnection:
                 try:
                     self._take(json.loads(text))
                 except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-                    self.complaint = f"it sent something that is not a rosbridge message: {text[:100]!r}"
+                    self.complaint = f"a reply is not a rosbridge message: {text[:100]!r}"
         self.is_lost = True
         self._lost()
         self.has_ended = True

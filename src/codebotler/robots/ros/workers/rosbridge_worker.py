@@ -32,7 +32,7 @@ class RosbridgeServer(Server):
             connection.send({"op": "advertise", "topic": self.name, "type": "/".join(parts_of(self.type))})
 
     def last_sign(self) -> float:
-        """Return when the server last sent its status, or the current time if it sends none."""
+        """Return the monotonic time of the server's last status, or the current time if it sends none."""
         if self._connection.protocol.has_status and self.kind == "action":
             return self._connection.heard.get(self.name, 0.0)
         return time.monotonic()
@@ -47,7 +47,7 @@ class RosbridgeServer(Server):
         return not has_status or self.name in self._connection.settled
 
     def cancel(self, goal: str = "") -> None:
-        """Cancel one goal, or all goals of all clients. Services and topics ignore this."""
+        """Cancel one goal, or all goals if the id `goal` is empty. Services and topics ignore this."""
         if self.kind == "action":
             self._connection.send(self._connection.protocol.cancel(self.name, goal))
 
@@ -86,7 +86,7 @@ class RosbridgeWorker(SkillWorker):
         return {}
 
     def cancel_all(self) -> bool:
-        """Cancel all goals repeatedly for a while. Return False on ROS 2, where this is not possible."""
+        """Cancel all goals repeatedly for 3 s. Return False if this is impossible, as on ROS 2."""
         if not self.graph.protocol.has_status:
             return False
         deadline = time.monotonic() + INSIST_SECONDS
@@ -140,8 +140,8 @@ class RosbridgeWorker(SkillWorker):
         else:
             text = update.text
             if update.state == "lost":
-                why = text or "it does not say why"
-                text = f"rosbridge could not perform a goal of {goal.server.name}: {why}"
+                why = text or "no reason is given"
+                text = f"rosbridge could not perform the goal of {goal.server.name}: {why}"
             self.finish(goal, update.state, update.values, text)
 
     def _lost(self) -> None:
@@ -151,9 +151,9 @@ class RosbridgeWorker(SkillWorker):
             where = self.graph.address
             cancel = self.graph.protocol.cancel(goal.server.name, goal.handle)
             if goal.server.kind == "action" and self.graph.insist(cancel):
-                text = f"the connection to {where} was lost; its goal was cancelled over a new connection"
+                text = f"the connection to {where} was lost; the goal was cancelled over a new connection"
             else:
-                text = f"the connection to {where} was lost, but its goal continues: STOP THE ROBOT BY HAND"
+                text = f"the connection to {where} was lost, but the goal continues: STOP THE ROBOT BY HAND"
             self.end(goal, "lost", text=text)
 
 

@@ -77,7 +77,7 @@ class ActionServers:
 
 
 def start_master(port: int | None, uri: str) -> Any:
-    """Start a master in this process, on a port of this machine."""
+    """Start a ROS master in this process. Raise SetupError if the port is in use, or None."""
     if port is None:
         raise SetupError(no_master(uri))
     import rosmaster.master
@@ -89,7 +89,7 @@ def start_master(port: int | None, uri: str) -> Any:
         except OSError as error:
             raise SetupError(
                 f"port {port} is in use by something that is not a ROS master ({error}); "
-                "name another in ROS_MASTER_URI"
+                "name another port in ROS_MASTER_URI"
             ) from None
     master = rosmaster.master.Master(port)
     master.start()
