@@ -25,7 +25,7 @@ def load_prompts(
     form: PromptForm = "chat",
     progress: Callable[[int], object] | None = None,
 ) -> list[dict[str, Any]]:
-    """Generate any number of prompts that ask for programs. The result is reproducible.
+    """Generate prompts that ask for programs. Equal arguments give equal prompts.
 
     Args:
         split: `train`, `validation` or `test`, which share no task.
@@ -80,7 +80,7 @@ def program_in(completion: PolicyReply, opening: str = "") -> str:
 
     Args:
         completion: a string, or messages that end with the policy's message.
-        opening: the last line of the prompt, if the completion continues it.
+        opening: the `opening` of the prompt's row. If it is not empty, the completion continues this line.
 
     Raises:
         UserError: there is no message, or the last one has no content.
@@ -94,7 +94,9 @@ def program_in(completion: PolicyReply, opening: str = "") -> str:
 def _last_text(messages: Sequence[Mapping[str, Any]]) -> str:
     """Return the text of the last message, whose content may be a list of parts."""
     if not messages or "content" not in messages[-1]:
-        raise UserError("a completion has no message with content; pass a string or a list of messages")
+        raise UserError(
+            "a completion has no message with content at its end; pass a string or a list of messages"
+        )
     content = messages[-1]["content"]
     if isinstance(content, str) or content is None:
         return content or ""

@@ -202,7 +202,7 @@ def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
     def sample(words: Sequence[str], count: int) -> list[str]:
         left = [word for word in dict.fromkeys(words) if word not in used]
         if len(left) < count:
-            raise file.wrong(f"only {len(left)} words are left, but {count} are needed", "choose", name)
+            raise file.wrong(f"{count} words are needed, but {len(left)} are left; use fewer", "choose", name)
         some = random.sample(left, count)
         used.update(some)
         return some
@@ -214,7 +214,7 @@ def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
             least, most = int(match[1]), int(match[2])
             if not least <= most < len(NUMBER_WORDS):
                 raise file.wrong(
-                    "the range is not valid; write two ascending numbers up to 10", "choose", name
+                    "the range is not valid; write ascending numbers up to 10, such as 2 to 4", "choose", name
                 )
             number = random.randint(least, most)
             yield from ((name, str(number)), (f"{name}_word", NUMBER_WORDS[number]))
@@ -286,5 +286,5 @@ def _words() -> Mapping[str, list[str]]:
 
 @cache
 def suite_file() -> SuiteFile:
-    """Return the version and the simulation settings that all families share."""
+    """Return the content of training.yaml: the version and the settings that all families share."""
     return YamlFile.read(FAMILY_FOLDER / "training.yaml").validate(SuiteFile)
