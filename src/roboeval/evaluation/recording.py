@@ -78,7 +78,7 @@ class RecordingRobot(SimulatedRobot):
         return sum(name != SLEEP for name, _ in self.calls)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Make a skill call, write its line, and return its result. Raise RobotError if the call fails."""
+        """Make a skill call, add its line to `lines`, and return the result. Raise RobotError if it fails."""
         if self._fault is not None and self.skill_calls == self._fault:
             self._fault, row = None, self.skills[skill]
             kind = "" if row.recording is None else row.recording.kind
@@ -98,7 +98,7 @@ class RecordingRobot(SimulatedRobot):
         return result
 
     def sleep_until(self, now: float) -> None:
-        """Let time pass until `now`, in seconds since the start, and write the line of the pause."""
+        """Let time pass until `now`, in seconds since the start, and add the pause to `lines`."""
         self.calls.append((SLEEP, (now,)))
         self.lines.append(f"{SLEEP}({round(now - self.now, 9)!r})")
         self.try_at = None

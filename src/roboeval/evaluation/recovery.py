@@ -170,7 +170,7 @@ def write_continuations(
 
 
 def recovery_data(results: Sequence[FaultResult]) -> dict[str, int | float | None]:
-    """Return counts of results, shares of the continued missions (None without any), and steps if passed."""
+    """Return counts, shares of continued missions (None without any), and the steps of those that passed."""
     ends = Counter(one.end for one in results)
     passed = [one for one in results if one.end == "passed"]
     continued = len(results) - ends["handled"] - ends["missing"]

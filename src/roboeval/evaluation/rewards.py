@@ -132,7 +132,7 @@ class Components:
 
 
 def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bool = True) -> Components:
-    """Compute a program's components from its outcome in each world. `parses` means it is valid Python."""
+    """Compute a program's components from its outcome in each world. If it is valid Python, it `parses`."""
     ran = [(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)]
     reward = total([Share.of(*one) for one in ran])
     kinds = ["" if outcome.error is None else outcome.error.kind for outcome in outcomes]

@@ -57,9 +57,7 @@ def _unsaid(task: Task) -> Iterator[Finding]:
             if word is None and not fact.commonsense:
                 wrong = f'contains none of the words for "{fact.fact}"; add one of them'
             elif word is not None and fact.commonsense:
-                wrong = (
-                    f'mentions "{fact.fact}" by "{word}", but it is marked as common sense; remove the words'
-                )
+                wrong = f'mentions "{fact.fact}" by "{word}", a fact marked as common sense; remove the words'
             else:
                 continue
             line = file.line(("facts", number))

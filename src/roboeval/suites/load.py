@@ -38,7 +38,7 @@ SUITE_NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 
 def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKILLS) -> Suite:
-    """Read a suite.
+    """Return a suite of tasks, given its name or its folder.
 
     Args:
         name: a suite that ships with RoboEval or with an installed package, a folder, or

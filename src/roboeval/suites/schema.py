@@ -98,7 +98,10 @@ class AcceptedFinding(StrictForm):
 
 
 class ScenarioFile(WorldFile):
-    """A world in a task file. In its ablation, `ablation` and `ablation_people` replace the other lists."""
+    """A world in a task file, with its requirements.
+
+    In its ablation, `ablation` is used instead of `require`, and `ablation_people` instead of `people`.
+    """
 
     about: Name
     require: Require

@@ -50,7 +50,7 @@ class HouseRules:
     def read(
         cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (), *, of_suite: bool = False
     ) -> HouseRules:
-        """Read a file of house rules. Raise UserError if it is invalid or names a room not in `rooms`."""
+        """Read a file of house rules. Raise UserError if it is invalid or names a room that `rooms` lacks."""
         rules = read_rules(path, skills, rooms)
         if not of_suite and not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
             raise UserError(

@@ -23,7 +23,7 @@ MAX_MISSION_CALLS = 100
 def load_missions(
     split: str = "train", *, count: int = 1_000, seed: int = 0, only: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
-    """Generate any number of missions, each in one world of a task. The result is reproducible.
+    """Generate missions, each in one world of a task. Equal arguments give equal missions.
 
     The arguments and errors are those of `load_prompts`, and the tasks are the same.
 
@@ -61,7 +61,7 @@ class TrainingMission:
         family: the family of the task.
         seed: the seed of the task.
         prompt_index: the number of the phrasing, from 0.
-        world: the index of the world among those that need work; larger numbers start again from the first.
+        world: the index of the world among those with something to do. Larger numbers begin again at 0.
 
     Raises:
         UserError: the family or prompt does not exist.

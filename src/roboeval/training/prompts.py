@@ -94,9 +94,7 @@ def program_in(completion: PolicyReply, opening: str = "") -> str:
 def _last_text(messages: Sequence[Mapping[str, Any]]) -> str:
     """Return the text of the last message, whose content may be a list of parts."""
     if not messages or "content" not in messages[-1]:
-        raise UserError(
-            "a completion has no message with content at its end; pass a string or a list of messages"
-        )
+        raise UserError("a completion has no message with content; pass a string or a list of messages")
     content = messages[-1]["content"]
     if isinstance(content, str) or content is None:
         return content or ""

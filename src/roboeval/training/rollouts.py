@@ -31,7 +31,7 @@ def judge(
     house: HouseRules | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> list[Components]:
-    """Compute the reward of each program, and its components, in the worlds of the program's task.
+    """Return the reward and its components for each program, in order, from the worlds of its task.
 
     Args:
         rollouts: the programs. Equal programs are judged once.

@@ -29,7 +29,7 @@ DEFAULT_TURNS: dict[AgentMode, int] = {"agent": 300, "replan": 4}  # some worlds
 
 @dataclass(frozen=True, kw_only=True)
 class AgentPlan(GenerationPlan):
-    """Plans missions: for each prompt, a number of them in each world of its task.
+    """Plans missions: for each prompt, `num_completions` of them in each world of its task.
 
     Args:
         mode: `agent` if the model calls skills, or `replan` if it writes a program and, after each failure,
@@ -70,7 +70,7 @@ class AgentPlan(GenerationPlan):
     async def complete(
         self, key: CompletionKey, model: str, ask: Ask, earlier: Sequence[Reply] = ()
     ) -> dict[str, Any]:
-        """Let the model carry out a mission, and return its row. Its `earlier` replies are repeated first."""
+        """Let the model carry out a mission, after its `earlier` replies if any, and return the row."""
         conversation = self.begin(key)
         for reply in earlier:
             await asyncio.to_thread(conversation.add, reply)

@@ -41,7 +41,7 @@ GC_THRESHOLD = 100_000  # allocations between garbage collections; high because 
 
 
 class Local:
-    """Runs programs on this machine, in a given pool or in a new one with the given number of workers."""
+    """Runs programs on this machine, in a given pool or in a new pool with the given number of workers."""
 
     def __init__(self, pool: WorkerPool | int, **isolation: bool) -> None:
         self._given, self._isolation = pool, isolation
@@ -72,7 +72,7 @@ class Local:
 
 @cache
 def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = False) -> Worker:
-    """Return this process's worker, started on the first call. Raise EngineError if isolation is missing."""
+    """Return this process's worker, started only once. Raise EngineError if it lacks required isolation."""
     worker = Worker(one_process_per_run=one_process_per_run)
     if require_isolation and not worker.has_seccomp:
         worker.close()

@@ -100,5 +100,5 @@ def run_batch(functions: bytes, isolation: Mapping[str, bool], works: Sequence[W
 
 @lru_cache(maxsize=1)
 def load_functions(functions: bytes) -> tuple[RunPrograms[Any], Callable[[Any], Any]]:
-    """Unpickle functions. They are cached because they refer to a whole suite."""
+    """Unpickle `function` and `then`. They are cached, because they contain a whole suite."""
     return pickle.loads(functions)  # type: ignore[no-any-return] # noqa: S301 - pickled by our own parent process

@@ -138,7 +138,7 @@ def run_shard(
     versions: str,  # a machine with other versions might judge differently
     isolation: Mapping[str, bool],
 ) -> tuple[list[WorkResult], str | None]:
-    """Run programs in a Ray process. Return the results, and a warning if isolation was incomplete."""
+    """Run programs in a Ray process. Return the results, and a warning or None if isolation is complete."""
     machine = platform.node()
     if versions != VERSIONS:
         raise EngineError(f"{machine} has {VERSIONS}; install {versions} there")

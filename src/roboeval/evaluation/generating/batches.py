@@ -52,7 +52,7 @@ def write_requests(
     with run.writing():
         about, _, todo = begin_batch(run, plan, model.name, model.settings)
         if not todo:
-            raise UserError(f"needs no request: it has all {how_many(len(plan.keys()))}", file=run.path)
+            raise UserError(f"already has all {how_many(len(plan.keys()))}; none is requested", file=run.path)
         with open_replacement(path) as file:
             for number, key in enumerate(todo, 1):
                 asked = model.request(plan.prompt(key), number=plan.sample(key))

@@ -18,7 +18,7 @@ from roboeval.suites.load import Scenario, Suite
 
 INSTRUCTION_NOT_RECORDED = "instruction not recorded"
 OF_SUITE = "the suite's current prompt is:"
-SUITE_CHANGED = "the suite has changed since this was judged"
+SUITE_CHANGED = "the suite has changed since the evaluation"
 TRACE_CUT = "the trace was too long to save, so the failure cannot be explained"
 TRACES_TOO_LONG = "the traces of this program are too long to explain this check"
 

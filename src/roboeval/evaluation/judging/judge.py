@@ -45,7 +45,7 @@ def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
 
 
 def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
-    """Return whether requirements decide: the run ended normally, or timed out where it may wait forever."""
+    """Return whether requirements decide on a run: it finished, or timed out in a world that allows this."""
     waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
     return waited or outcome.status is Status.FINISHED
 
@@ -102,7 +102,7 @@ def evaluate(
 def judgements(
     completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
 ) -> Iterator[tuple[Completion, bytes | None]]:
-    """Yield each completion with its judgement as JSON, or with None after a warning if it takes too long."""
+    """Yield each completion with its judgement as JSON, or warn and yield None if judging takes too long."""
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[Work]:
@@ -161,7 +161,7 @@ def _scenarios(suite: Suite, task: str, acted: Acted | None, *, ablated: bool) -
 
 
 def run_in_worlds(suite: Suite, worker: Worker, works: Sequence[Work], *, ablated: bool) -> list[Ran]:
-    """Run programs in the worlds of their tasks, and missions of agents in the worlds where they acted."""
+    """Run each program in all worlds of its task, and each mission of an agent only in its own world."""
     planned = [
         (task, program, Acted(int(where[0]), where[1]) if where else None) for task, program, *where in works
     ]

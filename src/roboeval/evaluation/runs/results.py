@@ -54,7 +54,7 @@ def load_results(
         `ending`, `mission_world`, `turns`, `tool_errors`, `cost` and `accepted` (whether the check found no
         problem; null if the program was not checked). These columns describe a world: `world_number`,
         `world`, `satisfied`, `status`, `error_kind`, `error_message`, `line`, `failed_checks` (joined by
-        "; "), `category` (of the first failed check) and `events`. Worlds are numbered from 0.
+        "; "), `category` (of the first failed check) and `events`. Prompts, indexes and worlds count from 0.
 
     Raises:
         UserError: the run or suite does not exist, the suite has not judged the run, a file is damaged, or

@@ -50,8 +50,8 @@ Numbered: TypeAlias = list[Annotated[list[int | str | None], msgspec.Meta(min_le
 class WorldVerdict(TypedDict):
     """The judgement in one world.
 
-    `circumstances` describes `places`, `holding`, `to` and `destinations`. If the trace is too long for the
-    row, only its first events are there, and `cut` counts the others.
+    The function `circumstances` describes `places`, `holding`, `to` and `destinations`. If the trace is too
+    long for the row, only its first events are there, and `cut` counts the others.
     """
 
     world: str
@@ -206,7 +206,7 @@ class Seal:
         self._count, self._hash = 0, hashlib.sha256()
 
     def add(self, line: bytes) -> None:
-        """Add a line that was read or written."""
+        """Count and hash a line that was read or written."""
         self._count += bool(line.strip())
         self._hash.update(line)
 

@@ -91,7 +91,7 @@ class TrainedTask:
         return self.suite.tasks[self.name].prompts
 
     def expect_prompt(self, index: int) -> None:
-        """Raise UserError if there is no prompt with this number."""
+        """Raise UserError if the task has no prompt with this number, from 0."""
         if not 0 <= index < len(self.prompts):
             raise UserError(f"{self.name} has no prompt {index}; use 0 to {len(self.prompts) - 1}")
 
@@ -103,7 +103,7 @@ def family_names() -> tuple[str, ...]:
 
 
 def family_file(family: str) -> Path:
-    """Return the file of a family, given its name or a `.yaml` file. Otherwise, raise UserError."""
+    """Return the file of a family, given its name or the file's path. Raise UserError if there is none."""
     if family.endswith(".yaml") and Path(family).is_file():
         return Path(family)
     if family not in family_names():
@@ -112,7 +112,7 @@ def family_file(family: str) -> Path:
 
 
 def trained_task(family: str, seed: int, *, worlds: int = TRAINING_WORLDS) -> TrainedTask:
-    """Generate the task of a family for a seed. The result is reproducible.
+    """Generate the task of a family for a seed. Equal arguments give equal tasks.
 
     Args:
         family: one of `family_names()`, or the path of a `.yaml` file, which is read only once.

@@ -64,7 +64,7 @@ class WorldSampler:
 
     @cached_property
     def factors(self) -> dict[str, tuple[FactorLevel, ...]]:
-        """Return the possible values of each factor, such as the rooms where Alice may be for `alice.in`."""
+        """Return the possible values by factor: for `alice.in`, these are the rooms where Alice may be."""
         found = {ROBOT_FACTOR: self._rooms(self.form.worlds.robot, ROBOT_FACTOR)}
         for name, person in self.form.worlds.people.items():
             found[f"{name}.in"] = self._rooms(person.where, "people", name, "in")
