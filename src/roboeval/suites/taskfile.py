@@ -165,9 +165,7 @@ class _Reader:
             raise wrong(f'"{START}" is reserved for the starting room of the robot; rename the parameter')
         for used in _USED.findall(body.rtl):
             if used not in parameters and used not in self.phrases and used != START:
-                known = (
-                    f"use {listed(parameters, 'or')}" if parameters else f"write {name}({used}) to add one"
-                )
+                known = f"use {listed(parameters, 'or')}" if parameters else f"declare it as {name}({used})"
                 raise wrong(f'the check "{name}" has no parameter "{used}"; {known}', "rtl")
         means = self._means(head, parameters)
         if unused := next((p for p in parameters if f"{{{p}}}" not in body.rtl), None):

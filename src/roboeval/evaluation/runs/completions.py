@@ -84,7 +84,7 @@ class Completion:
         known = {name: more.pop(name) for name in FIELDS if name in more}
         for name in REQUIRED:
             if name not in known:
-                raise UserError(f'the row has no "{name}"; a row looks like {EXAMPLE}')
+                raise UserError(f'the entry "{name}" is missing; a row looks like {EXAMPLE}')
         return cls(**known, more=more)
 
     @property

@@ -17,7 +17,7 @@ from codebotler.core.trace import Status
 from roboeval.evaluation.runs.completions import Completion, CompletionKey, name_of
 
 MAX_LINE_BYTES = 1_000_000_000  # enough for a row with very many worlds
-NO_ROW = "this line is not a row of an evaluation"
+NO_ROW = "this line is not an evaluation row"
 BROKEN = "was damaged or changed after the evaluation was finished"
 # The group matches escapes of lone surrogates. The alternatives before it match backslashes and whole pairs.
 ESCAPES = re.compile(rb"\\\\|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(\\u[dD][89a-fA-F]..)")
