@@ -28,7 +28,7 @@ from roboeval.evaluation.runs.rows import key_of
 from roboeval.suites.load import Suite
 
 DRAWS_PER_PROMPT = 20
-"""The number of groups of candidates that are drawn for each prompt."""
+"""The number of groups of candidates that `clarify` samples for each prompt."""
 
 
 @dataclass(frozen=True)
@@ -47,29 +47,29 @@ class ClarifySettings:
 
 
 class ClarifyShares(TypedDict):
-    """Pass rates with and without a question, and how often it is asked. Prompts count equally.
+    """Pass rates from 0 to 1 with and without a clarifying question. In a mean, all prompts count equally.
 
-    `mattered` is the share of questions after which the chosen program passes but that of the largest cluster
-    fails, or the reverse. It is null if there was no question.
+    `mattered` is the share of questions that change the verdict: either the program of the answer passes, or
+    that of the largest cluster, but not both. `mattered` is None if no question was asked.
     """
 
-    one: float  # of the candidates that pass
-    majority: float  # of the largest clusters that pass
-    question: float  # of the programs that pass and result from the question, if there is one
-    asked: float
+    one: float  # the share of single candidates that pass
+    majority: float  # the share of groups in which the program of the largest cluster passes
+    question: float  # the share of groups that pass after their question, or without one if none is asked
+    asked: float  # the share of groups with a question
     mattered: float | None
-    tokens: float | None  # the mean number for a group; null if the run does not count tokens
+    tokens: float | None  # the mean number for a group; None if the run does not count tokens
 
 
 class PromptShares(ClarifyShares):
-    """The `ClarifyShares` of one prompt."""
+    """The `ClarifyShares` of one prompt, which is identified by its task and its index in the task."""
 
     task: str
     prompt: int
 
 
 class ClarifyMeasurement(ClarifyShares):
-    """A measurement with its settings, and with hashes of the suite and the completions."""
+    """A measurement of a run, with its settings and hashes of the suite (`digest`) and the completions."""
 
     digest: str
     completions: str
@@ -82,13 +82,13 @@ class ClarifyMeasurement(ClarifyShares):
 def clarify(
     completions: Iterable[Completion], suite: Suite, pool: WorkerPool, settings: ClarifySettings
 ) -> Iterator[PromptShares]:
-    """Yield the shares of each prompt that has enough completions for a group of candidates.
+    """Yield pass rates with and without a clarifying question, for each prompt with enough completions.
 
     Candidates are compared in imagined worlds only. The worlds of the task are only for the verdicts and for
     the simulated person, who takes the first option that passes.
 
     Raises:
-        UserError: no prompt has as many completions as a group has candidates.
+        UserError: no prompt has `settings.candidates` completions, or a completion is an agent's mission.
     """
     by_prompt = _by_prompt(completions, settings.candidates)
     every = [one for some in by_prompt.values() for one in some]
@@ -120,12 +120,12 @@ def _by_prompt(completions: Iterable[Completion], least: int) -> dict[tuple[str,
     found: dict[tuple[str, int], list[Completion]] = {}
     for one in completions:
         if one.acted is not None:
-            raise UserError("the completions are missions of an agent; name a run of programs")
+            raise UserError("the completions are missions of an agent; choose a run with programs")
         found.setdefault((one.task, one.prompt), []).append(one)
     if not (enough := {key: some for key, some in sorted(found.items()) if len(some) >= least}):
         most = max(map(len, found.values()), default=0)
         raise UserError(
-            f"no prompt has {least} completions, but at most {most}; choose a smaller --candidates"
+            f"a group needs {least} completions, but no prompt has more than {most}; lower --candidates"
         )
     return enough
 
@@ -198,7 +198,7 @@ def measurement_data(
 
 
 def store_measurement(run: RunFolder, suite: Suite, data: dict[str, Any]) -> Path:
-    """Store a measurement in a run, in a file named after its settings, and return the file's path."""
+    """Store the `measurement_data` in a run, in a file named after the settings. Return the file's path."""
     name = "candidates-{candidates:02}-noise-{noise}-seed-{seed}.json".format_map(data)
     path = run.questions(evaluation_key(suite, ablated=False)) / name
     write_whole(path, to_text(data))
@@ -206,12 +206,12 @@ def store_measurement(run: RunFolder, suite: Suite, data: dict[str, Any]) -> Pat
 
 
 def read_measurements(results: Results) -> Iterator[tuple[ClarifyMeasurement, bool]]:
-    """Yield the measurements stored in a run, and whether its completions and suite are still the same."""
+    """Yield each measurement of a run, with False if the completions or the suite have changed since then."""
     for path in sorted(results.run.questions(results.key or "").glob("*.json")):
         try:
             one = msgspec.json.decode(read_text(path), type=ClarifyMeasurement)
         except (msgspec.DecodeError, RecursionError):
-            mend = "is not a result of `roboeval clarify`; remove it and measure again"
+            mend = "is not a result of `roboeval clarify`; remove the file and run the command again"
             raise UserError(mend, file=path) from None
         now = results.manifest.get("digest"), _hash_of(results.completions.values())
         yield one, (one["digest"], one["completions"]) == now

@@ -34,10 +34,12 @@ def evaluate_run(
     engine: OpenEngine | None = None,
     completions: Iterable[Completion] | None = None,
 ) -> Iterator[Row]:
-    """Judge the completions that have no row yet, and yield all rows of the selected tasks.
+    """Judge the completions of a run that have no row yet, and yield all rows of `tasks` (None means all).
 
-    Rows of other tasks are kept. A completion that takes too long to judge gets no row, so that the next
-    evaluation tries it again. Pass `completions` if the run has already been read.
+    Rows of other tasks are kept, but `redo` first deletes all rows. If `ablated`, only common sense is
+    required. A completion that takes too long to judge gets no row, so that the next evaluation tries again.
+    Pass `completions` if the run has already been read. Raises UserError if the suite or the tool differ from
+    those that judged earlier rows.
     """
     key = evaluation_key(suite, ablated=ablated)
     with run.writing():
@@ -85,7 +87,7 @@ def _is_in(task: str, tasks: frozenset[str] | None) -> bool:
 def evaluation_metadata(
     suite: Suite, *, ablated: bool = False, tasks: frozenset[str] | None = None
 ) -> dict[str, Any]:
-    """Return the content of KEY.json: the suite and tool that judge, and the selected tasks."""
+    """Return the content of KEY.json: the suite and the tool that judge, and the selected tasks or None."""
     house = suite.house
     return {
         "suite": suite.name,
@@ -104,7 +106,7 @@ def evaluation_metadata(
 
 
 def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
-    """Return what KEY.json contains, or None if it is missing. Raise UserError if suite or tool changed."""
+    """Return the content of KEY.json or None if there is none. Raise UserError if suite or tool changed."""
     key = evaluation_key(suite, ablated=ablated)
     path, rows = run.manifest(key), run.rows(key)
     if not path.exists():
@@ -116,8 +118,8 @@ def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[st
     was = load_json_object(path)
     for name, now in evaluation_metadata(suite, ablated=ablated, tasks=None).items():
         if was.get(name) != now and name != "tasks":
-            change = f"{name.replace('_', ' ')} was {_brief(was.get(name))} and is now {_brief(now)}"
-            raise UserError(f"was judged differently: {change}; --redo starts over", file=path)
+            change = f"its {name.replace('_', ' ')} was {_brief(was.get(name))} and is now {_brief(now)}"
+            raise UserError(f"cannot be continued, because {change}; --redo starts over", file=path)
     return was
 
 

@@ -54,14 +54,14 @@ def roboeval(
     mode: str = "program",
     max_turns: int | None = None,
 ) -> Task:
-    """Ask for programs for service robots, and judge each in every world of its task. A sample is a prompt.
+    """Ask for programs for service robots, and judge each in every world of its task. A sample is one prompt.
 
     Args:
         suite: the name or folder of a suite.
-        tasks: the tasks to select, by default all.
+        tasks: the names of tasks, as a list or separated by commas; by default all.
         worlds: the number of worlds, 1 to 10,000, if the suite samples worlds.
         seed: the random seed for sampling worlds.
-        mode: `program`, or `agent` to let models call skills. Then a sample is a prompt in one world.
+        mode: `program`, or `agent` for models that call skills; then a sample is one prompt in one world.
         max_turns: the maximum number of replies of an agent in a mission, 1 to 1,000; by default 300.
     """
     is_agent = mode == "agent"
@@ -102,7 +102,7 @@ def _suite(name: str, worlds: int | None, seed: int | None) -> Suite:
 @solver
 @register_as_codebotler
 def prompting(suite: str = "paper") -> Solver:
-    """Return a solver that builds the prompt of `roboeval generate`: skills, examples and instruction."""
+    """Return a solver that builds the prompt of `roboeval generate`: skills, examples and the instruction."""
     known = load_suite(suite)
     rules = known.house_sentences
 
@@ -122,7 +122,7 @@ def _messages(prompt: Prompt) -> list[Any]:
 @solver
 @register_as_codebotler
 def acting(suite: str, worlds: int | None, seed: int | None, max_turns: int) -> Solver:
-    """Return a solver that lets the model carry out one mission, like `roboeval generate --mode agent`."""
+    """Return a solver in which a model calls skills in one world, like `roboeval generate --mode agent`."""
     by = _suite(suite, worlds, seed)
     plan = AgentPlan(by, mode="agent", limits=TurnLimits(max_turns))
     offered = [
@@ -177,7 +177,7 @@ async def _log_calls(message: Any, result: str) -> list[Any]:  # noqa: ANN401 - 
 @scorer(metrics=[accuracy(), stderr(cluster="task"), grouped(accuracy(), "task", all=False)])
 @register_as_codebotler
 def verdict(suite: str = "paper", worlds: int | None = None, seed: int | None = None) -> Scorer:
-    """Return a scorer that judges like `roboeval evaluate`, in a separate thread."""
+    """Return a scorer that judges samples like `roboeval evaluate`: correct if they pass, else incorrect."""
 
     def judged(state: TaskState) -> Score:
         by, completion = _suite(suite, worlds, seed), _completion(state)

@@ -35,7 +35,7 @@ FAULTS = {
     ASK: ("AskNoPerson", "the person is gone"),
     PICK: ("PickInvalidObject", "the thing was moved"),
 }
-"""The kind and message of the error if a skill is made to fail, by the kind of event of the skill."""
+"""The error of a skill that is made to fail: its kind and message, by the kind of event of the skill."""
 
 
 class RecordingRobot(SimulatedRobot):
@@ -45,8 +45,8 @@ class RecordingRobot(SimulatedRobot):
         world: the world.
         suite: the suite with the settings, skills and house rules.
         made: the calls that it repeats at the start. A call of `SLEEP` lets time pass.
-        contracts: what it may do at most.
-        fault: the index of a later call that fails, but only once; None if none fails.
+        contracts: limits on its calls; a call outside of them ends the run.
+        fault: the index of the one skill call that fails, counted from 0 with those in `made`; None for none.
     """
 
     def __init__(
@@ -74,11 +74,11 @@ class RecordingRobot(SimulatedRobot):
 
     @property
     def skill_calls(self) -> int:
-        """The number of skill calls so far, without pauses."""
+        """The number of skill calls that were made so far, without pauses."""
         return sum(name != SLEEP for name, _ in self.calls)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Record a call and make it. If it fails, mark its events with the kind of the error."""
+        """Make a skill call, add its line to `lines`, and return the result. Raise RobotError if it fails."""
         if self._fault is not None and self.skill_calls == self._fault:
             self._fault, row = None, self.skills[skill]
             kind = "" if row.recording is None else row.recording.kind
@@ -98,14 +98,14 @@ class RecordingRobot(SimulatedRobot):
         return result
 
     def sleep_until(self, now: float) -> None:
-        """Record that time passes until `now` seconds since the start."""
+        """Let time pass until `now`, in seconds since the start, and add the pause to `lines`."""
         self.calls.append((SLEEP, (now,)))
         self.lines.append(f"{SLEEP}({round(now - self.now, 9)!r})")
         self.try_at = None
         super().sleep_until(now)
 
     def result_text(self, skill: str, arguments: Sequence[Argument], result: Result) -> str:
-        """Return the result of a call as JSON text."""
+        """Return the result of a call as JSON text, or `null` if the skill returns nothing."""
         return json.dumps(named_result(self.skills[skill], arguments, result), ensure_ascii=False)
 
     def _write_error(self, source: str, error: RobotError) -> None:

@@ -38,10 +38,10 @@ class FaultResult:
     world: int  # the index of its world
     call: int  # the index of the call
     shortest: int  # the number of events without the fault
-    end: Literal["handled", "missing", "rejected", "failed", "passed"] = "handled"  # by the program itself
-    why: str = ""  # the problem, the error or the requirement by which it was rejected or failed
-    steps: int = 0  # the number of events; 0 unless it ran to its end
-    repeated: int = 0  # how many times it spoke, picked up or put down more than without the fault
+    end: Literal["handled", "missing", "rejected", "failed", "passed"] = "handled"  # by the program
+    why: str = ""  # the problem, error or requirement because of which the rest was rejected or failed
+    steps: int = 0  # the number of events of the whole mission; 0 if no rest was run
+    repeated: int = 0  # how many more times the robot spoke, picked up or put down than without the fault
 
 
 @dataclass(frozen=True)
@@ -52,11 +52,11 @@ class Interruption:
     scenario: Scenario = field(repr=False)  # its world, and what its prompt asks for
     made: Sequence[Call] = field(repr=False)  # the calls before the fault
     whole: Trace = field(repr=False)  # the trace without the fault
-    past: MissionPast = field(repr=False)  # what it did, and why it ended
+    past: MissionPast = field(repr=False)  # what the mission did, and why it ended
 
     @property
     def room_map(self) -> RoomMap:
-        """The map of the rooms, with what the mission did and saw there."""
+        """The map of the rooms, with what the mission did and saw in them before it ended."""
         return self.past.add_to(RoomMap.of(self.scenario.world), self.past.place)[0]
 
     def prompt(self, suite: Suite) -> Prompt:
@@ -67,16 +67,16 @@ class Interruption:
 
 
 def rest_prompt(past: MissionPast, request: Prompt) -> Prompt:
-    """Turn the prompt for a whole mission, `request`, into a prompt for the rest of the mission."""
+    """Return the prompt for the rest of a mission, made from `request`, the prompt for the whole mission."""
     last_step = (past.done or [""])[-1]
     return request.to_continue(past.program, past.steps, past.why, past.here(past.place), last_step)
 
 
 def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[Interruption | FaultResult]:
-    """Run a program once for each of its skill calls, and let that call fail, in each world.
+    """Let each skill call of a program fail once in each world of its task, in a separate run.
 
-    Returns the missions that ended, and a result for each error that the program handled itself. The list is
-    empty if the program is wrong.
+    Returns an Interruption for each run that ended with an error, and a FaultResult for each run in which the
+    program handled the error itself. The list is empty if the program is wrong without any fault.
     """
     found: list[Interruption | FaultResult] = []
     task = suite.task(one.task)
@@ -101,7 +101,7 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
 def find_first_right(
     worker: Worker, suite: Suite, completions: Iterable[Completion]
 ) -> Iterator[list[Interruption | FaultResult]]:
-    """Yield `find_interruptions` of the first right program of each task, and [] for other completions."""
+    """Yield `find_interruptions` for each completion, but [] after the first right program of its task."""
     done: set[str] = set()
     for one in completions:
         found = [] if one.task in done else find_interruptions(worker, suite, one)
@@ -110,14 +110,14 @@ def find_first_right(
 
 
 def check_rest(worker: Worker, suite: Suite, program: str, room_map: RoomMap, begun: str) -> CheckResult:
-    """Check a program for the rest of a mission. `begun` is the interrupted program."""
+    """Check a program for the rest of a mission, which `begun` started. It must not repeat steps."""
     settings = CheckSettings(skills=suite.skills, house_rules=suite.house_rules)
     left = remaining_outcomes(begun, room_map, suite.skills, worker=worker)
     return hold_to_past(check_on(worker, program, room_map, settings), begun, left)
 
 
 def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: str | None) -> FaultResult:
-    """Check a program for the rest of a mission. If it is accepted, run it and judge the whole mission."""
+    """Check a program for the rest of a mission (None: there is none), run it and judge the whole mission."""
     if program is None:
         return replace(one.result, end="missing")
     problems = check_rest(worker, suite, program, one.room_map, one.past.program).problems
@@ -143,9 +143,10 @@ def _effects(trace: Trace) -> Counter[str]:
 def write_continuations(
     model: Model, prompts: Sequence[Prompt], concurrency: int, update: Callable[[int, str], None]
 ) -> list[str | None]:
-    """Return a program for each request, or None if the model refuses it or has no program recorded.
+    """Return a program for each prompt, or None if the model refuses it or has no program recorded.
 
-    Equal requests are sent once. `update` is called with the number of replies. The model is closed.
+    At most `concurrency` requests run at a time. Equal prompts are sent once. `update` is called with the
+    number of replies and an empty text. The model is closed at the end.
     """
     limited, programs = RateLimited(model, concurrency), dict[Prompt, str | None]()
 
@@ -169,7 +170,7 @@ def write_continuations(
 
 
 def recovery_data(results: Sequence[FaultResult]) -> dict[str, int | float | None]:
-    """Count results. Shares refer to the missions with a continuation, steps to those that passed."""
+    """Return counts, shares of continued missions (None without any), and the steps of those that passed."""
     ends = Counter(one.end for one in results)
     passed = [one for one in results if one.end == "passed"]
     continued = len(results) - ends["handled"] - ends["missing"]

@@ -18,7 +18,7 @@ from roboeval.evaluation.runs.completions import find_key_fault
 from roboeval.suites.load import Scenario, Suite, load_suite
 
 AskedWorlds: TypeAlias = Sequence[tuple[Scenario, Sequence[bool]]]
-"""The worlds of a prompt with its requirements, and whether each requirement holds at the start."""
+"""The worlds of a prompt, each with its requirements and whether each of them holds at the start."""
 
 ERROR_FACTOR = 0.5  # factor for a run that ends in an error, so that returning early would earn more
 
@@ -53,8 +53,8 @@ def reward(
         suite: a suite, or the name or folder of a suite.
 
     Raises:
-        UserError: the suite, task or prompt does not exist, its worlds are not sampled or are too many,
-            or a program is not a string.
+        UserError: the suite, task or prompt does not exist, the suite samples no worlds, `worlds` is out of
+            range, or a program is not a string.
         EngineError: no isolated process could be started.
     """
     expect_list(programs, "the programs")
@@ -75,14 +75,14 @@ def reward(
 
 @dataclass(frozen=True)
 class Share:
-    """The share of requirements that a run satisfies in one world."""
+    """The shares of requirements that a run satisfies in one world. Their product is the world's reward."""
 
     gained: float | None  # satisfied share of the requirements not met at the start, or None
     kept: float  # share of the other requirements still met, halved by an error
 
     @classmethod
     def of(cls, outcome: Outcome, scenario: Scenario, at_start: Sequence[bool]) -> Share:
-        """Compute the share for a run, given which requirements held at the start."""
+        """Compute the shares of a run. `at_start` says which requirements held before the robot moved."""
         gained: list[bool] = []
         kept: list[bool] = []
         for is_now, was_met in zip(are_met(outcome, scenario), at_start, strict=True):
@@ -99,7 +99,7 @@ def requirements_of(suite: Suite, task: str, prompt: int) -> AskedWorlds:
 
 
 def total(shares: Sequence[Share]) -> float:
-    """Compute the reward over all worlds of a task.
+    """Compute a program's reward from its shares in all worlds of a task.
 
     A world with nothing to gain counts like the mean of the others. If no world has anything to gain, a
     program that does nothing gets the full reward.
@@ -132,10 +132,7 @@ class Components:
 
 
 def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bool = True) -> Components:
-    """Compute the reward and its components from a program's outcome in each world.
-
-    `parses` says whether the program is valid Python.
-    """
+    """Compute a program's components from its outcome in each world. If it is valid Python, it `parses`."""
     ran = [(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)]
     reward = total([Share.of(*one) for one in ran])
     kinds = ["" if outcome.error is None else outcome.error.kind for outcome in outcomes]
@@ -158,13 +155,13 @@ class RewardWork(NamedTuple):
 
 
 REWARD_CACHE: dict[bytes, Components] = {}
-"""The results by name. Each operation on the dictionary is atomic, so that threads and forks need no lock."""
+"""Components of judged programs, by `RewardWork.name`. Threads need no lock: each operation is atomic."""
 
 
 def judge_works(works: Sequence[RewardWork], progress: Callable[[int], object] = bool) -> list[Components]:
-    """Judge programs, a few batches at a time, and keep the results for programs of the same name.
+    """Return the reward and components of each program, in order. Programs with the same name run once.
 
-    `progress` is called with the number of different results so far whenever there is a new one.
+    Results are cached. `progress` is called with the number of distinct programs that are done so far.
     """
     distinct = {work.name: work for work in works}
     known = {name: found for name in distinct if (found := REWARD_CACHE.get(name)) is not None}
@@ -180,7 +177,7 @@ def judge_works(works: Sequence[RewardWork], progress: Callable[[int], object] =
 
 
 def judge_batch(works: Sequence[RewardWork]) -> list[Components]:
-    """Judge programs. The calling thread must have a worker of the shared pool."""
+    """Run programs and compute their components. The calling thread needs a worker of the shared pool."""
     worker = shared_pool().here()
     asked = [work.asking() for work in works]
     jobs = [

@@ -44,7 +44,7 @@ class Finding:
         return f"{self.kind}: {self.subject}"
 
     def rendered(self) -> str:
-        """Format the finding as a line with a path relative to the current folder."""
+        """Format the finding as a line of text. Its path is relative to the current folder, if possible."""
         here = Path.cwd()
         path = self.path.relative_to(here) if self.path.is_relative_to(here) else self.path
         what, why = ("warning", "") if self.accepted is None else ("accepted", f": {self.accepted}")
@@ -52,7 +52,7 @@ class Finding:
 
 
 def render(findings: Iterable[Finding], *, accepted: bool = False) -> str:
-    """Format findings as lines. Accepted findings are listed with their reasons, or only counted."""
+    """Format findings as lines. List the accepted ones with reasons if `accepted`, or else count them."""
     every = [*findings]
     lines = [one.rendered() for one in every if accepted or one.accepted is None]
     if hidden := len(every) - len(lines):

@@ -57,9 +57,7 @@ def _unsaid(task: Task) -> Iterator[Finding]:
             if word is None and not fact.commonsense:
                 wrong = f'contains none of the words for "{fact.fact}"; add one of them'
             elif word is not None and fact.commonsense:
-                wrong = (
-                    f'mentions "{fact.fact}" by "{word}", but it is marked as common sense; remove the words'
-                )
+                wrong = f'mentions "{fact.fact}" by "{word}", a fact marked as common sense; remove the words'
             else:
                 continue
             line = file.line(("facts", number))
@@ -159,7 +157,7 @@ def _slow(task: Task) -> Iterator[Finding]:
 
 
 def searched_regexes(task: Task) -> dict[str, Requirement]:
-    """Return the regexes that judging searches for, each with the first requirement that contains it."""
+    """Map each regex that judging a program searches for to the first requirement with the regex."""
     found: dict[str, Requirement] = {}
     for requirement in {one.text: one for one in _required(task)}.values():
         for element in elements(requirement.formula):
@@ -180,7 +178,7 @@ def _compiled(text: TextPattern) -> Iterator[str]:
 
 
 def judge_solutions(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:
-    """Judge a task's solutions by all requirements, first in its worlds, then in those of its ablation."""
+    """Return the verdicts on each solution of a task: first in its worlds, then in those of its ablation."""
     judges = [worlds for worlds in (task.scenarios, task.ablation) if worlds]
     runs = [(solution.program, worlds) for worlds in judges for solution in solutions(task)]
     with WorkerPool(workers) as pool:

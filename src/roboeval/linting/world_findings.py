@@ -49,7 +49,7 @@ class JudgedWorld:
         return YamlFile.read(self.task.path).line(("worlds", self.number - 1))
 
     def finding(self, kind: FindingKind, subject: str, message: str, line: int | None) -> Finding:
-        """Create a finding about this task, with the path of its file."""
+        """Return a new finding about the task of this world, with the path of its file."""
         return Finding(kind, subject, message, self.task.path, line)
 
     def findings(self) -> Iterator[Finding]:
@@ -87,7 +87,7 @@ class JudgedWorld:
         if premises is not None:
             reasons = [f'"{r.text}"' for r in others if r.formula in premises]
             unless = f" without breaking {'one of ' * (len(reasons) > 1)}{listed(reasons)}" if reasons else ""
-            message = f'nothing was found that breaks "{subject}" in {self.name}{unless}; it may be redundant'
+            message = f'"{subject}" in {self.name} may be redundant: no run was found that breaks it{unless}'
             yield self.finding("implied", subject, message, line)
 
     def _undecided(self, subject: str, what: str, line: int | None) -> Finding:

@@ -38,7 +38,7 @@ SUITE_NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 
 def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKILLS) -> Suite:
-    """Read a suite.
+    """Return a suite of tasks, given its name or its folder.
 
     Args:
         name: a suite that ships with RoboEval or with an installed package, a folder, or
@@ -63,7 +63,7 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
 
 
 def has_suite(name: str) -> bool:
-    """Whether a suite is built in, installed or generated from families. Folders do not count."""
+    """Return whether a suite is built in, installed or generated from families. Folders do not count."""
     return name in known_suites() or family_tasks_named(name) is not None
 
 
@@ -78,7 +78,7 @@ def known_suites() -> tuple[str, ...]:
 
 
 def suite_folder(name: str) -> Path:
-    """Return the folder of a suite, given its name or the folder itself. Otherwise, raise UserError."""
+    """Return the folder of a suite, given its name or a path. Raise UserError if there is no such suite."""
     if name in shipped_suites():
         return SUITES / name
     if SUITE_NAME.fullmatch(name) and (installed := installed_folder(name)) is not None:
@@ -99,7 +99,7 @@ def installed_suites() -> EntryPoints:
 
 
 def installed_folder(name: str) -> Path | None:
-    """Find the folder of a suite in an installed package, or return None if no package has the suite.
+    """Return the folder of a suite in an installed package, or None if no package has a suite of this name.
 
     None of the package's code runs. Raises UserError if the name is ambiguous or the folder has no suite.
     """
@@ -118,4 +118,4 @@ def installed_folder(name: str) -> Path | None:
     for place in (spec and spec.submodule_search_locations) or ():
         if (Path(place, *below) / "suite.yaml").is_file():
             return Path(place, *below)
-    raise UserError(f'the package of the suite "{name}" has no suite.yaml in {modules[0]}; reinstall it')
+    raise UserError(f'the suite "{name}" has no suite.yaml in {modules[0]}; reinstall its package')

@@ -63,7 +63,7 @@ class TaskFact(StrictForm):
     """A fact in an instruction, such as "she is in her office", on which requirements depend.
 
     Args:
-        words: regexes; every prompt must match at least one of them, or none if the fact is common sense.
+        words: regexes. Each prompt must match one of them, or none of them if the fact is common sense.
     """
 
     fact: YamlText  # a sentence that states the fact
@@ -98,7 +98,10 @@ class AcceptedFinding(StrictForm):
 
 
 class ScenarioFile(WorldFile):
-    """A world in a task file, with its requirements."""
+    """A world in a task file, with its requirements.
+
+    In its ablation, `ablation` is used instead of `require`, and `ablation_people` instead of `people`.
+    """
 
     about: Name
     require: Require
@@ -131,7 +134,7 @@ class SampledThingFile(StrictForm):
 
 
 class CornerFile(StrictForm):
-    """A sampled task's world with some values set by hand. Other values are the first of their list."""
+    """A world of a sampled task with some values set by hand. All others are the first in their lists."""
 
     about: Name
     set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}
@@ -166,7 +169,7 @@ class TaskFile(_AnyTaskFile):
 
 
 class SampledTaskFile(_AnyTaskFile):
-    """A task file whose worlds are sampled."""
+    """A task file whose worlds are sampled. `let` names values, and `phrases` names lists of regexes."""
 
     worlds: SampledWorldsFile
     let: dict[Name, Annotated[str, BeforeValidator(str)]] = {}
@@ -175,19 +178,17 @@ class SampledTaskFile(_AnyTaskFile):
 
 
 class LimitsFile(StrictForm):
-    """The limits in suite.yaml after which the run of a program ends."""
+    """The limits in suite.yaml after which a run ends. `ticks` are loop iterations and function calls."""
 
-    seconds: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] = 3600.0
-    calls: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 1_000
+    seconds: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] = 3600.0  # simulated
+    calls: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 1_000  # of skills
     ticks: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 200_000
 
 
 def _moment(value: object) -> object:
     if isinstance(value, datetime) and value.tzinfo is not None and 1970 <= value.year < 2100:  # noqa: PLR2004 - the message names these years
         return value
-    raise ValueError(
-        "it should be a time from 1970 to 2099 with an offset, such as 2024-01-01T12:00:00+00:00"
-    )
+    raise ValueError("it should be a time in 1970 to 2099 with an offset, such as 2024-01-01T12:00:00+00:00")
 
 
 class SimulationFile(StrictForm):

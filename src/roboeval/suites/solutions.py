@@ -15,7 +15,7 @@ LENDING_SUITE = Path(__file__).with_name("paper")  # the suite whose instruction
 
 
 class EquivalentMutantFile(StrictForm):
-    """A mutant that behaves differently from the original but is still right."""
+    """A mutant (changed program) that behaves differently from its original but is still right."""
 
     operator: Name
     diff: YamlText  # the diff that `roboeval mutate` prints
@@ -31,7 +31,7 @@ class SolutionsFile(StrictForm):
 
 
 def solutions(task: Task) -> tuple[Solution, ...]:
-    """Return the distinct solutions of a task, including those of a suite it borrows its instruction from."""
+    """Return the distinct solutions of a task, also from the suite that lends its instruction, if any."""
     folders = [task.path.parents[1], *([LENDING_SUITE] if task.borrows else [])]
     distinct: dict[str, Solution] = {}
     for form in (_read(folder, task) for folder in folders):
@@ -47,7 +47,7 @@ def solutions(task: Task) -> tuple[Solution, ...]:
 
 
 def locate_solution(task: Task, solution: Solution) -> tuple[Path, int | None]:
-    """Return the file and line of a solution, or the task file if the solution is in another suite."""
+    """Return the file and line of a solution under `programs`, or else line 1 of the task file."""
     path = task.path.parents[1] / "solutions" / task.path.name
     programs = _read(task.path.parents[1], task).programs
     if solution not in programs:

@@ -50,7 +50,7 @@ class HouseRules:
     def read(
         cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (), *, of_suite: bool = False
     ) -> HouseRules:
-        """Read a rules file, validated against any given rooms. Raise UserError if it is invalid."""
+        """Read a file of house rules. Raise UserError if it is invalid or names a room that `rooms` lacks."""
         rules = read_rules(path, skills, rooms)
         if not of_suite and not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
             raise UserError(
@@ -65,7 +65,7 @@ class Suite:
 
     Args:
         worlds: the minimum number of worlds per task if they are sampled; None if they are written by hand.
-        recorded: the programs of the recorded models, if they are not stored in files.
+        recorded: the programs of recorded models, if the tasks are generated.
     """
 
     name: str  # the name, which evaluations record
@@ -110,7 +110,7 @@ class Suite:
             seed: the random seed; by default the current seed.
 
         Raises:
-            UserError: the worlds are not sampled, are determined by the suite's name, or are too many.
+            UserError: the worlds are written by hand or depend on the suite's name, or a number is wrong.
         """
         if self.worlds is None or self.folder is None:
             why = "are determined by its name" if self.is_generated else "are written by hand"
@@ -121,7 +121,7 @@ class Suite:
         return read_suite(self.folder, self.skills, count or self.worlds, seed).with_house_rules(self.house)
 
     def with_own_worlds(self) -> Suite:
-        """Return the suite with the number and seed of worlds in its suite.yaml."""
+        """Return the suite as its files describe it, if its worlds are sampled; else return it unchanged."""
         if self.worlds is None or self.folder is None:
             return self
         return read_suite(self.folder, self.skills)
@@ -140,7 +140,7 @@ def task_files(folder: Path) -> list[Path]:
 
 
 def read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed: int | None = None) -> Suite:
-    """Read the suite in a folder, or return the cached suite if no file has changed."""
+    """Read the suite in a folder. By default, suite.yaml gives `count` (the worlds per task) and `seed`."""
     files = [*sorted(folder.glob("*.yaml")), *sorted(folder.glob("*.py")), *task_files(folder)]
     stats = [(file.name, file.stat()) for file in files if file.is_file()]
     versions = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)

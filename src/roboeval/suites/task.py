@@ -36,7 +36,7 @@ class Requirement:
     arguments: tuple[str, ...] = field(default=(), repr=False)
 
     def is_asked_by(self, prompt: int) -> bool:
-        """Whether a prompt asks for this requirement."""
+        """Return whether the prompt with this number, from 0, asks for this requirement."""
         return not self.words or any(number == prompt for number, _ in self.words)
 
 
@@ -103,7 +103,7 @@ class Task:
         return f"Task({self.name!r}, {prompts}, {worlds})"
 
     def judged_in(self, *, ablated: bool = False) -> tuple[Scenario, ...]:
-        """Return the worlds and requirements for judging programs, or none if there is no ablation."""
+        """Return the worlds in which programs are judged; an empty tuple if `ablated` without an ablation."""
         return (self.ablation or ()) if ablated else self.scenarios
 
 
@@ -115,7 +115,7 @@ def plain_check(text: str) -> str:
 
 
 def world_title(number: int, total: int | None, about: str) -> str:
-    """Return the title of a world, without the number that starts a sampled world's description.
+    """Return the title of a world, such as `World 2 of 9: nobody is in the lab`.
 
     If `total` is 1, the title has no number, because an agent's only world may be any world of its task.
     """

@@ -13,7 +13,7 @@ from codebotler.core.program import parse_expression
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.text.labels import scope_flags
-from codebotler.core.text.words import listed
+from codebotler.core.text.words import counted, listed
 from codebotler.core.yaml_files import YamlFile, YamlPath
 from codebotler.rtl import RtlSyntaxError, parse
 from codebotler.rtl.regex_words import first_choice
@@ -47,7 +47,7 @@ def read_task(
         file: the task file.
         path: its path.
         skills: the skills that formulas may use.
-        lender: the task file to borrow the instruction from, if any.
+        lender: the task file whose instruction and facts the task borrows, or None.
         count: the minimum number of worlds to sample.
         seed: the random seed of sampled worlds.
         words: words for people that `{people}` in a check matches in addition to names.
@@ -60,7 +60,7 @@ def read_task(
     form = file.validate(SampledTaskFile, data) if is_sampled else file.validate(TaskFile, data)
     if form.name != path.stem:
         raise file.wrong(
-            f'the task is named "{form.name}", but its file "{path.name}"; use the same name', "name"
+            f'the task is named "{form.name}", but its file is "{path.name}"; use the same name', "name"
         )
     ablation = None
     if isinstance(form, SampledTaskFile):
@@ -165,7 +165,7 @@ class _Reader:
             raise wrong(f'"{START}" is reserved for the starting room of the robot; rename the parameter')
         for used in _USED.findall(body.rtl):
             if used not in parameters and used not in self.phrases and used != START:
-                known = f"its parameters are: {', '.join(parameters)}" if parameters else "it has none"
+                known = f"use {listed(parameters, 'or')}" if parameters else f"declare it as {name}({used})"
                 raise wrong(f'the check "{name}" has no parameter "{used}"; {known}', "rtl")
         means = self._means(head, parameters)
         if unused := next((p for p in parameters if f"{{{p}}}" not in body.rtl), None):
@@ -228,10 +228,8 @@ class _Reader:
         if check is None:
             raise self.file.wrong(f'there is no check "{name}"; add it under checks', *at)
         if len(arguments) != len(check.parameters):
-            takes = ", ".join(check.parameters) or "no argument"
-            raise self.file.wrong(
-                f'the check "{name}" takes {takes}, but "{text}" passes {len(arguments)}', *at
-            )
+            takes, given = ", ".join(check.parameters) or "no argument", counted(len(arguments), "argument")
+            raise self.file.wrong(f'the check "{name}" takes {takes}, but "{text}" has {given}', *at)
         values = {**self.phrases, START: start, **dict(zip(check.parameters, arguments, strict=True))}
         rtl = _fill(check.rtl, values)
         spoken = {START: start, **{p: first_choice(values[p]) for p in check.parameters}}

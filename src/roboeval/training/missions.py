@@ -23,7 +23,7 @@ MAX_MISSION_CALLS = 100
 def load_missions(
     split: str = "train", *, count: int = 1_000, seed: int = 0, only: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
-    """Generate any number of missions, each in one world of a task. The result is reproducible.
+    """Generate missions, each in one world of a task. Equal arguments give equal missions.
 
     The arguments and errors are those of `load_prompts`, and the tasks are the same.
 
@@ -42,7 +42,7 @@ def load_missions(
 
 
 def mission_tools() -> list[dict[str, Any]]:
-    """Return the tools of all missions, in OpenAI's format."""
+    """Return the tools that every mission offers, as functions in OpenAI's format."""
     tools = [(tool, json.loads(tool.schema)) for tool in tools_for(SKILLS)]
     return [
         {
@@ -61,7 +61,7 @@ class TrainingMission:
         family: the family of the task.
         seed: the seed of the task.
         prompt_index: the number of the phrasing, from 0.
-        world: the number of the world, among those where something is to be done. The first follows the last.
+        world: the index of the world among those with something to do. Larger numbers begin again at 0.
 
     Raises:
         UserError: the family or prompt does not exist.
@@ -88,7 +88,7 @@ class TrainingMission:
         return cls(**{name: row[name] for name in ("family", "seed", "prompt_index", "world")})
 
     def call(self, name: str, arguments: str | Mapping[str, object]) -> str:
-        """Make one call, unless the mission is over, and return its result."""
+        """Call a skill, `wait` or `give_up`, and return the result as text. After the end, do nothing."""
         if self.is_over:
             return "the mission is over"
         self._calls_left -= 1
@@ -98,7 +98,7 @@ class TrainingMission:
         return result
 
     def answer(self, text: str) -> None:
-        """End the mission with the policy's last words, which do not change the reward."""
+        """End the mission because the policy is done. Its last words, `text`, do not change the reward."""
         if not self.is_over:
             self._mission.answer(text)
 

@@ -25,7 +25,7 @@ def load_prompts(
     form: PromptForm = "chat",
     progress: Callable[[int], object] | None = None,
 ) -> list[dict[str, Any]]:
-    """Generate any number of prompts that ask for programs. The result is reproducible.
+    """Generate prompts that ask for programs. Equal arguments give equal prompts.
 
     Args:
         split: `train`, `validation` or `test`, which share no task.
@@ -80,7 +80,7 @@ def program_in(completion: PolicyReply, opening: str = "") -> str:
 
     Args:
         completion: a string, or messages that end with the policy's message.
-        opening: the last line of the prompt, if the completion continues it.
+        opening: the `opening` of the prompt's row. If it is not empty, the completion continues this line.
 
     Raises:
         UserError: there is no message, or the last one has no content.

@@ -31,7 +31,7 @@ def judge(
     house: HouseRules | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> list[Components]:
-    """Judge a policy's programs in the worlds of their tasks, a few batches at a time.
+    """Return the reward and its components for each program, in order, from the worlds of its task.
 
     Args:
         rollouts: the programs. Equal programs are judged once.
@@ -40,7 +40,7 @@ def judge(
         progress: a function that is called with the number of distinct rollouts judged so far.
 
     Raises:
-        UserError: a family or prompt does not exist.
+        UserError: a family or prompt does not exist, or `worlds` is out of range.
         EngineError: the engine failed, for a reason unrelated to the programs.
     """
     rules = "" if house is None else house.digest

@@ -143,7 +143,7 @@ def test_a_prompt_out_of_range(tmp_path: Path, prompt: int) -> None:
     (tmp_path / "a.jsonl").write_text(row(prompt=prompt))
     refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
     assert refusal.at == ("a.jsonl", 1)
-    assert f"SayGoodDay/{prompt}/0" in refusal.sentence
+    assert f'"SayGoodDay" has no prompt {prompt}' in refusal.sentence
     assert "0 to 4" in refusal.sentence
 
 

@@ -90,7 +90,7 @@ def test_tokens_are_counted_for_a_group(paper: Suite, pool: WorkerPool) -> None:
 
 
 def test_too_few_completions_are_refused(paper: Suite, pool: WorkerPool) -> None:
-    with pytest.raises(UserError, match="at most 2"):
+    with pytest.raises(UserError, match="more than 2"):
         next(clarify(completions(RIGHT, WRONG), paper, pool, ClarifySettings(3)))
 
 

@@ -222,7 +222,7 @@ OURS = Completion(task="Visit", prompt=0, index=0, program="")
     ("wrong", "named"),
     [
         (replace(OURS, task="Vist"), '"Vist"'),
-        (replace(OURS, prompt=9), "/9/0: .* prompts 0 to "),
+        (replace(OURS, prompt=9), "no prompt 9; .* prompts 0 to "),
         (OURS.row, "dict.* Completion"),
     ],
 )

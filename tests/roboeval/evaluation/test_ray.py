@@ -282,5 +282,5 @@ def test_killed_nodes_lose_nothing_until_none_is_left(
     assert there == here
     nodes.kill()
     monkeypatch.setattr(rayengine, "RAY_POLL_SECONDS", 1)
-    with pytest.raises(EngineError, match="no free core"):
+    with pytest.raises(EngineError, match="no cores left"):
         list(cluster.map_distinct(NUMBERS, make_works(range(2)), int))

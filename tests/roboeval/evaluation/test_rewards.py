@@ -237,7 +237,7 @@ def test_wrong_arguments_are_refused(paper: Suite) -> None:
     [
         ("LunchTime", "0", [], ["prompt is '0'", "0 to 4"]),
         ("LunchTime", True, [], ["prompt is True", "0 to 4"]),
-        ("LunchTime", -1, [], ["LunchTime/-1/0", "0 to 4"]),
+        ("LunchTime", -1, [], ["LunchTime", "no prompt -1", "0 to 4"]),
         (["LunchTime"], 0, [], ['"paper"', "no task"]),
     ],
 )

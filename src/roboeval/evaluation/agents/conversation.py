@@ -19,7 +19,7 @@ from roboeval.evaluation.recovery import rest_prompt
 from roboeval.evaluation.runs.endings import ERROR, OUTSIDE_CONTRACT, TIMEOUT, TOKEN_LIMIT, TURN_LIMIT
 
 MAX_REASONING = 200_000
-"""The characters of reasoning that a row keeps; the log of turns has all of it."""
+"""The number of characters of reasoning that completions.jsonl keeps; turns.jsonl keeps all of it."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Conversation(ABC):
         self.mission, self.limits = mission, limits
         self.prompt: Prompt | None = prompt  # the next request to the model; None after the end
         self.replies: list[Reply] = []
-        self.result: str | None = None  # of the calls in the last reply
+        self.result: str | None = None  # the result of the calls in the last reply
 
     def add(self, reply: Reply) -> None:
-        """Make the call or run the program in a reply. End the mission if the reply contains neither."""
+        """Make the call in a reply or run its program. End the mission if the reply contains neither."""
         self.replies.append(reply)
         self.result = None
         if reply.no_program is None:
@@ -49,7 +49,7 @@ class Conversation(ABC):
             self.end(reply.no_program)
 
     def end(self, ending: str, why: str = "") -> None:
-        """End the mission with one of `ENDINGS`, such as `Rejected` after the server refused a request."""
+        """End the mission with one of `ENDINGS`, such as `Rejected`, and note `why` in its program."""
         self.prompt = None
         self.mission.end(ending, why)
 
@@ -59,14 +59,14 @@ class Conversation(ABC):
 
     @property
     def limit(self) -> str | None:
-        """The ending if a limit is reached, `TurnLimit` or `TokenLimit`, or None."""
+        """`TurnLimit` or `TokenLimit` if the mission has reached this limit, or else None."""
         if len(self.replies) >= self.limits.turns:
             return TURN_LIMIT
         used = sum(reply.usage.total for reply in self.replies)
         return TOKEN_LIMIT if self.limits.tokens is not None and used >= self.limits.tokens else None
 
     def data(self) -> dict[str, Any]:
-        """Return the mission as entries of completions.jsonl, such as `program`, `ending` and `usage`."""
+        """Return the mission as entries of a row of completions.jsonl, such as `program` and `ending`."""
         last, latencies = self.replies[-1], [reply.latency_s or 0 for reply in self.replies]
         return {
             **mission_data(self.mission),
@@ -102,7 +102,7 @@ class AgentConversation(Conversation):
 
 
 def mission_data(mission: AgentMission) -> dict[str, Any]:
-    """Return a mission's calls as `program`, its `ending`, and the counts of mistakes as `tool_errors`."""
+    """Return a mission's calls as `program`, its `ending`, and `tool_errors`: mistakes counted by kind."""
     return {
         "program": mission.program,
         "ending": mission.ending,

@@ -37,7 +37,7 @@ UNKNOWN_SETTINGS = SamplingSettings(temperature=None, top_p=None)  # a client ha
 
 @dataclass
 class MissionDesk:
-    """Hands out the missions of a run that are not done, one at a time, and saves each at its end."""
+    """Gives an MCP client the unfinished missions of a run, one at a time, and saves each at its end."""
 
     plan: AgentPlan
     model: str  # the name of the model behind the client
@@ -60,7 +60,7 @@ class MissionDesk:
         ]
 
     def call(self, name: str, arguments: dict[str, Any]) -> str:
-        """Make one call of a tool, and return its result as text for the client."""
+        """Call a tool of `tools` for the client, and return the result as text."""
         if self._current is None:
             return self._begin() if name == NEXT else f"There is no mission; call {NEXT}."
         key, mission = self._current
@@ -80,7 +80,7 @@ class MissionDesk:
         return f"{result}\n{_OVER}"
 
     def leave(self) -> None:
-        """End the mission that the client has left, so that it cannot be tried again."""
+        """End the current mission, if any, because the client has left. The mission cannot be tried again."""
         if self._current is not None:
             self.call(GIVE_UP, {"reason": "the client has left"})
 
@@ -108,7 +108,7 @@ class MissionDesk:
 
 @contextlib.contextmanager
 def open_desk(run: RunFolder, plan: AgentPlan, model: str) -> Iterator[MissionDesk]:
-    """Open a run whose missions an MCP client carries out. Missions that are done stay as they are."""
+    """Open a run for an MCP client, and yield a desk with its unfinished missions. Rows name the `model`."""
     with run.writing():
         about, _, todo = begin_batch(run, plan, model, UNKNOWN_SETTINGS)
         write_whole(run.about, to_text(about))

@@ -53,14 +53,14 @@ class AgentMission:
     Args:
         suite: the suite with the skills, the house rules and the settings of the simulation.
         scenario: the world, and what is required there.
-        contracts: what the robot may do at most. A call outside of them ends the mission.
+        contracts: limits on what the robot may do. A call outside of them ends the mission.
     """
 
     suite: Suite
     scenario: Scenario
     contracts: Sequence[Contract] = ()
     ending: str | None = None  # one of `ENDINGS`; None before the end
-    mistakes: Counter[str] = field(default_factory=Counter)  # and errors of the robot, by kind
+    mistakes: Counter[str] = field(default_factory=Counter)  # also of errors, by kind
     _in_a_row: int = 0  # mistakes
     _same: tuple[object, int] = (None, 0)  # the last call with its result, and how often it was made
 
@@ -69,9 +69,9 @@ class AgentMission:
         self._ledger = Ledger(self.robot)
 
     def call(self, name: str, arguments: str | Mapping[str, object]) -> str:
-        """Make one call, and return its result as text, such as `done`. The call may end the mission."""
+        """Call a skill, `wait` or `give_up`, and return the result as text. This may end the mission."""
         if self.ending is not None:
-            raise UserError("this mission is over")
+            raise UserError("this mission is over; begin another one")
         try:
             given = _read(arguments)
             if name in self.suite.skills:
@@ -93,7 +93,7 @@ class AgentMission:
         return text
 
     def refuse(self, kind: str, sentence: str, what: str) -> str:
-        """Count a mistake and return a message for the agent. Too many in a row end the mission."""
+        """Count a mistake, note `what` in the program, and return a message. Three in a row end a mission."""
         self.mistakes[kind] += 1
         self._in_a_row += 1
         self._note(f"{kind}: {what}")
@@ -102,7 +102,7 @@ class AgentMission:
         return f"{kind}: {sentence}"
 
     def refuse_several(self, names: Sequence[str]) -> str:
-        """Count several calls at once as a mistake. None of them is made."""
+        """Count several calls at once as a mistake, make none of them, and return a message for the agent."""
         return self.refuse(
             SEVERAL_CALLS,
             "the robot does one thing at a time, so none of these calls was made; send one call",
@@ -110,7 +110,7 @@ class AgentMission:
         )
 
     def answer(self, text: str) -> None:
-        """End the mission with the agent's last words."""
+        """End the mission, since the agent says that it is done, and note the text in the program."""
         self.ending = FINAL_ANSWER if self.robot.skill_calls else NO_CALL
         if text:
             self._note(f"In the end: {text}")
@@ -122,7 +122,7 @@ class AgentMission:
             self._note(f"{ending}: {why}")
 
     def give_up(self, reason: str) -> str:
-        """End the mission. If the last call failed, the ending is that error, since it is the cause."""
+        """End the mission and return a message. The ending is `GaveUp`, or `error` after a failed call."""
         at, lines = self.robot.try_at, self.robot.lines
         self.ending = GAVE_UP if at is None else ERROR
         if at is not None:
@@ -133,7 +133,7 @@ class AgentMission:
 
     @property
     def program(self) -> str:
-        """The calls so far as a program that does the same in this world."""
+        """The source of a program that makes the calls so far, and does the same in this world."""
         lines = self.robot.lines
         needs_time = any("time.sleep(" in line for line in lines)
         is_empty = all(line.startswith("#") for line in lines)
@@ -142,7 +142,7 @@ class AgentMission:
 
     @property
     def outcome(self) -> Outcome:
-        """The outcome of the calls so far, to judge the mission like a program."""
+        """The outcome of the calls so far, by which the mission is judged like a program."""
         kind = "robot-error" if self.ending == ERROR else "finished"
         end = {"end": kind, "number": len(self._ledger.errors) - 1}
         outcome = judge_end(self._ledger.outcome_at_end(end), self.robot)
@@ -203,5 +203,5 @@ def _read_seconds(given: Mapping[str, object]) -> float:
     seconds = given.get("seconds")
     is_number = isinstance(seconds, int | float) and not isinstance(seconds, bool)
     if not is_number or not 0 <= seconds <= LONGEST_WAIT:  # type: ignore[operator]  # a number
-        raise UserError(f"call it as wait(seconds: float), with 0 to {LONGEST_WAIT:,} seconds")
+        raise UserError(f"call this tool as wait(seconds: float), with 0 to {LONGEST_WAIT:,} seconds")
     return float(seconds)  # type: ignore[arg-type]  # a number

@@ -29,13 +29,13 @@ DEFAULT_TURNS: dict[AgentMode, int] = {"agent": 300, "replan": 4}  # some worlds
 
 @dataclass(frozen=True, kw_only=True)
 class AgentPlan(GenerationPlan):
-    """Plans missions: for each prompt, a number of them in each world of its task.
+    """Plans missions: for each prompt, `num_completions` of them in each world of its task.
 
     Args:
         mode: `agent` if the model calls skills, or `replan` if it writes a program and, after each failure,
             another one for the rest.
-        limits: when a mission ends at the latest.
-        contract: what the robot may do at most in each mission, if that is limited.
+        limits: the numbers of replies and tokens after which a mission ends.
+        contract: a limit on what the robot may do in each mission, or None.
     """
 
     mode: AgentMode
@@ -70,7 +70,7 @@ class AgentPlan(GenerationPlan):
     async def complete(
         self, key: CompletionKey, model: str, ask: Ask, earlier: Sequence[Reply] = ()
     ) -> dict[str, Any]:
-        """Let the model carry out a mission. Its `earlier` replies are replayed, with the same effects."""
+        """Let the model carry out a mission, after its `earlier` replies if any, and return the row."""
         conversation = self.begin(key)
         for reply in earlier:
             await asyncio.to_thread(conversation.add, reply)
@@ -99,14 +99,14 @@ class AgentPlan(GenerationPlan):
         return AgentMission(self.suite, scenario, contracts)
 
     def prompt(self, key: CompletionKey) -> Prompt:
-        """Return the first request of a mission."""
+        """Return the prompt with which the mission of a key begins."""
         if self.mode == "replan":
             return super().prompt(key)
         rules, skills = self.suite.house_sentences, self.suite.skills
         return agent_prompt(self.instruction(key), rules=rules, skills=skills)
 
     def world(self, key: CompletionKey) -> int:
-        """Return the index of the world of a mission."""
+        """Return the index of the world in which the mission of a key takes place."""
         return key[2] % self._worlds(key[0])
 
     def _worlds(self, task: str) -> int:

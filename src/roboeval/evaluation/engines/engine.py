@@ -22,14 +22,14 @@ RunPrograms: TypeAlias = Callable[[Worker, Sequence[Work]], Sequence[RawResult]]
 
 
 class Engine(Protocol):
-    """Runs programs in isolated processes."""
+    """Runs programs in isolated processes, on this machine or on others."""
 
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
         """Run each distinct program once, apply `then` to each result, and yield the values in input order.
 
-        `function` and its results must be picklable; `then` runs in the main thread of a process if possible.
+        `function` and its results must be picklable. `then` runs in the main thread of a process if possible.
         """
         ...
 
@@ -41,7 +41,7 @@ GC_THRESHOLD = 100_000  # allocations between garbage collections; high because 
 
 
 class Local:
-    """Runs programs on this machine, in a given pool or in a new one with the given number of workers."""
+    """Runs programs on this machine, in a given pool or in a new pool with the given number of workers."""
 
     def __init__(self, pool: WorkerPool | int, **isolation: bool) -> None:
         self._given, self._isolation = pool, isolation
@@ -63,7 +63,7 @@ class Local:
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
-        """See `Engine`."""
+        """Run each distinct program once, as `Engine.map_distinct` describes."""
         here = self._pool.here
         return self._pool.map_distinct(
             lambda some: function(here(), some), works, name=lambda work: digest(*work), then=then
@@ -72,7 +72,7 @@ class Local:
 
 @cache
 def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = False) -> Worker:
-    """Return the worker of this process, which is started on the first call."""
+    """Return this process's worker, started only once. Raise EngineError if it lacks required isolation."""
     worker = Worker(one_process_per_run=one_process_per_run)
     if require_isolation and not worker.has_seccomp:
         worker.close()

@@ -31,9 +31,8 @@ from roboeval.evaluation.engines.engine import (
 class Processes:
     """Runs programs in several processes. Each process has a worker, and judges what its worker runs.
 
-    With threads instead of processes, a single core would simulate and judge for all workers. A process
-    starts when there is work for it, and all end when the results are exhausted. The caller must warn if
-    programs are not fully isolated.
+    Threads instead of processes would share a single core. A process starts when there is work for it, and
+    all of them end after the last result. The caller must warn if programs are not fully isolated.
     """
 
     def __init__(self, workers: int, **isolation: bool) -> None:
@@ -42,7 +41,7 @@ class Processes:
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
-        """See `Engine`."""
+        """Run each distinct program once, as `Engine.map_distinct` describes."""
         functions = pickle.dumps((function, then))
         with process_pool(self._workers) as processes:
 
@@ -53,12 +52,12 @@ class Processes:
             try:
                 yield from map_batches(submit, works, workers=self._workers, name=lambda work: digest(*work))
             except BrokenExecutor:
-                raise EngineError("a worker process died; it may have run out of memory") from None
+                raise EngineError("a worker process died, perhaps for lack of memory") from None
 
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Start a process pool that ends with the block, or with this process if that ends first."""
+    """Start a process pool that ends with the block, or with this process if this process ends first."""
     context = get_context("spawn")
     with ExitStack() as held:
         with starting_processes():
@@ -94,12 +93,12 @@ def exit_with_parent(pipe: Connection) -> None:
 
 
 def run_batch(functions: bytes, isolation: Mapping[str, bool], works: Sequence[Work]) -> list[Any]:
-    """Run and judge programs in this process, with its own worker. `functions` are pickled."""
+    """Run and judge programs with this process's worker. `functions` are pickled: `function` and `then`."""
     function, then = load_functions(functions)
     return [then(ran) for ran in function(own_worker(**isolation), works)]
 
 
 @lru_cache(maxsize=1)
 def load_functions(functions: bytes) -> tuple[RunPrograms[Any], Callable[[Any], Any]]:
-    """Unpickle functions. They are cached because they refer to a whole suite."""
+    """Unpickle `function` and `then`. They are cached, because they contain a whole suite."""
     return pickle.loads(functions)  # type: ignore[no-any-return] # noqa: S301 - pickled by our own parent process

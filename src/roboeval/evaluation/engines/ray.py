@@ -37,9 +37,8 @@ class RayCluster:
     """Runs programs on the Ray cluster at RAY_ADDRESS, or by default on the cluster of this machine.
 
     Without a cluster, or if RAY_ADDRESS is "local", it starts a cluster that only this machine can reach,
-    and stops that cluster at the end. By default, it submits two shards per core.
-
-    Raises UserError if Ray is not installed or no cluster answers at the address.
+    and stops that cluster at the end. `workers` is the number of shards (batches of programs) at a time, by
+    default two per core. Raises UserError if Ray is not installed or no cluster answers at the address.
     """
 
     def __init__(self, workers: int | None = None, **isolation: bool) -> None:
@@ -69,7 +68,7 @@ class RayCluster:
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
-        """See `Engine`.
+        """Run each distinct program once, as `Engine.map_distinct` describes.
 
         Shards are never cancelled: Ray 2.60 can abort this process if a cancelled shard has just ended.
         """
@@ -105,14 +104,14 @@ class RayCluster:
     def _wait_for_some(self, shards: Iterable[Any]) -> Iterator[tuple[Any, list[Any]]]:
         ended, _ = self._ray.wait(list(shards), timeout=RAY_POLL_SECONDS)
         if not ended and not self._cores():
-            raise EngineError("the Ray cluster has no free core; add a node and try again")
+            raise EngineError("the Ray cluster has no cores left; add a node and try again")
         for shard in ended:
             try:
                 values, warning = self._ray.get(shard)
             except self._ray.exceptions.RayTaskError as error:
                 raise error.cause from None
             except self._ray.exceptions.RayError as error:
-                raise EngineError(f"Ray gave up on a shard: {str(error).splitlines()[0]}") from None
+                raise EngineError(f"Ray could not run some programs: {str(error).splitlines()[0]}") from None
             if warning and not self._warned:
                 _log.warning(warning)
                 self._warned = True
@@ -139,10 +138,10 @@ def run_shard(
     versions: str,  # a machine with other versions might judge differently
     isolation: Mapping[str, bool],
 ) -> tuple[list[WorkResult], str | None]:
-    """Run programs in a Ray process. Return the results, and a warning if isolation was incomplete."""
+    """Run programs in a Ray process. Return the results, and a warning or None if isolation is complete."""
     machine = platform.node()
     if versions != VERSIONS:
-        raise EngineError(f"{machine} has {VERSIONS}, not {versions}")
+        raise EngineError(f"{machine} has {VERSIONS}; install {versions} there")
     function, then = functions
     try:
         worker = own_worker(**isolation)

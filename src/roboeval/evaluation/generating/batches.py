@@ -52,7 +52,7 @@ def write_requests(
     with run.writing():
         about, _, todo = begin_batch(run, plan, model.name, model.settings)
         if not todo:
-            raise UserError(f"already holds all {how_many(len(plan.keys()))}", file=run.path)
+            raise UserError(f"already has all {how_many(len(plan.keys()))}; none is requested", file=run.path)
         with open_replacement(path) as file:
             for number, key in enumerate(todo, 1):
                 asked = model.request(plan.prompt(key), number=plan.sample(key))
@@ -66,7 +66,7 @@ def write_requests(
 
 
 def request_id(about: Mapping[str, Any], key: CompletionKey, instruction: str) -> str:
-    """Return a name for a request that is unique among all runs: a hash of its instruction and run.json."""
+    """Return a request's name, TASK/PROMPT/INDEX/HASH. The hash tells apart runs with different settings."""
     mark = hashlib.sha256(to_line([*(about.get(name) for name in IDENTITY), instruction])).hexdigest()[:8]
     task, prompt, index = key
     return f"{task}/{prompt}/{index}/{mark}"
@@ -79,7 +79,7 @@ class ImportResult:
     new: int  # completions that the import added
     total: int  # completions that the run should have
     missing: int
-    why: str  # an error message of a missing completion, if any request failed
+    why: str  # why a completion is missing, such as the error message of its request
 
 
 BatchAnswer: TypeAlias = tuple[CompletionKey, int, object]  # to which request, the status, and the body
@@ -121,7 +121,7 @@ def import_answers(
                 file.append(to_line(row))
     missing = [key for key in expected if key not in there and key not in rows]
     reasons = (failed[key].sentence for key in missing if key in failed)
-    return ImportResult(len(rows), len(expected), len(missing), next(reasons, "they were not answered"))
+    return ImportResult(len(rows), len(expected), len(missing), next(reasons, "the file has no answer"))
 
 
 def _row(
@@ -138,9 +138,7 @@ def _row(
 def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:
     about = about_of(run)
     if not batches(about):
-        raise UserError(
-            "was not started by `roboeval generate --requests`; name the run that was", file=run.path
-        )
+        raise UserError("was not started by `roboeval generate --requests`; use another run", file=run.path)
     if about.get("suite") != suite.name:
         raise UserError(
             f'belongs to the suite "{about.get("suite")}"; select that suite with --suite', file=run.path
@@ -166,13 +164,13 @@ def _answers(path: Path, ids: Mapping[str, CompletionKey]) -> Iterator[BatchAnsw
 def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> BatchAnswer:
     row = parse_row(line)
     if row is None:
-        raise UserError("this line is not JSON; the file may be incomplete")
+        raise UserError("this line is not JSON; the file may be incomplete, so download it again")
     key, response, error = ids.get(str(row.get("custom_id"))), row.get("response"), row.get("error")
     if "response" not in row and "error" not in row:
-        raise UserError("this line is not an answer from a batch endpoint; name the file with the answers")
+        raise UserError("this line is not an answer from a batch endpoint; choose the file of answers")
     if key is None:
         name = repr(row.get("custom_id"))
-        raise UserError(f"this line answers a request of another run or with other settings: {name}")
+        raise UserError(f"the request {name} is of another run or has other settings; choose its run")
     if not isinstance(response, dict):
         return key, 200, error
     status, body = response.get("status_code"), response.get("body")

@@ -26,9 +26,10 @@ ProgramKey: TypeAlias = tuple[str, str]  # the name of a task and the hash of a 
 def check_programs(
     run: RunFolder, suite: Suite, completions: Iterable[Completion], engine: OpenEngine
 ) -> Iterator[tuple[ProgramKey, list[str]]]:
-    """Yield the problems of each program, and check only programs that are not checked yet.
+    """Yield the key of each distinct program, and its problems in sentences. Accepted programs have none.
 
-    The check uses the rooms of the task's first world and the suite's house rules.
+    Programs that this run has checked already are not checked again. The check uses the rooms of the task's
+    first world and the suite's house rules.
     """
     settings = CheckSettings(simulation=suite.settings, skills=suite.skills, house_rules=suite.house_rules)
     metadata = {

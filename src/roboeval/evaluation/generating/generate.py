@@ -25,7 +25,7 @@ FAILURES_IN_A_ROW = 3  # stop after this many, or the number of concurrent reque
 
 @dataclass(frozen=True)
 class Pace:
-    """Limits on concurrent requests, requests per minute, and total tokens."""
+    """Limits on concurrent requests, requests per minute, and total tokens. None means no limit."""
 
     concurrency: int = 8
     requests_per_minute: float | None = None
@@ -48,7 +48,7 @@ class GenerationProgress:
 
     @property
     def missing(self) -> str | None:
-        """Return a sentence such as "3 completions are missing: timed out", or None if all is well."""
+        """A sentence such as "3 completions are missing: timed out", or None if nothing went wrong."""
         left = self.total - self.done
         failed = (error.sentence for error in self.failures.values())
         reason = self.stopped or next(failed, "they were not requested")
@@ -63,7 +63,11 @@ def generate_run(
     *,
     on_progress: Callable[[GenerationProgress], None] = lambda _: None,
 ) -> GenerationProgress:
-    """Request the missing completions of a run, save each as it arrives, and close the model."""
+    """Request the missing completions of a run, save each as it arrives, and close the model.
+
+    Returns the final progress, which names the requests that failed. Raises UserError if the run has other
+    settings, or ModelError if requests failed and the run is still empty.
+    """
     with run.writing():
         with contextlib.closing(Appender(run.completions)) as file:  # drops a torn last line
             metadata, done, todo = begin_batch(run, plan, model.name, model.settings)
@@ -89,7 +93,7 @@ def generate_run(
 
 
 def reply_of_refusal(error: ModelError) -> Reply:
-    """Return the reply to record for a request that the server refused permanently."""
+    """Return the reply to record for a request that the server refused and would refuse again."""
     return make_reply(error.sentence, Usage(), None, None, known_kind="refusal", has_answer=False)
 
 

@@ -33,7 +33,7 @@ SAMPLE_STRIDE = 1_000_000  # offset of sample numbers between rounds, so that al
 
 @dataclass(frozen=True)
 class GenerationPlan:
-    """The completions that a run should have: a fixed number for each prompt of the selected tasks."""
+    """The completions that a run should have: `num_completions` for each prompt of `tasks` (None: all)."""
 
     suite: Suite
     tasks: frozenset[str] | None = None
@@ -42,30 +42,30 @@ class GenerationPlan:
     has_turns: ClassVar[bool] = False  # whether a completion takes several replies
 
     def keys(self) -> list[CompletionKey]:
-        """Return all keys: first the first completion of every prompt, then the second one, and so on."""
+        """Return the keys of all completions: first index 0 of every prompt, then index 1, and so on."""
         tasks = [task for name, task in self.suite.tasks.items() if self.tasks is None or name in self.tasks]
         prompts = [(task.name, prompt) for task in tasks for prompt in range(len(task.prompts))]
         return [(*prompt, index) for index in range(self.num_completions) for prompt in prompts]
 
     def instruction(self, key: CompletionKey) -> str:
-        """Return the instruction of a completion."""
+        """Return the instruction for which a completion is requested."""
         return self.suite.tasks[key[0]].prompts[key[1]]
 
     def prompt(self, key: CompletionKey) -> Prompt:
-        """Return the prompt that requests a completion."""
+        """Return the prompt that is sent to request a completion."""
         rules, skills = self.suite.house_sentences, self.suite.skills
         return prompt_for(self.instruction(key), rules=rules, skills=skills)
 
     def sample(self, key: CompletionKey) -> int:
-        """Return the number of the sample, on which its random seed depends."""
+        """Return the number of a completion's sample. The random seed of the request depends on it."""
         return key[2]
 
     def given(self) -> Iterable[Completion]:
-        """Return the completions to copy from the previous round, here none."""
+        """Return the completions to copy instead of requesting them. A run without rounds has none."""
         return ()
 
     def describe(self) -> dict[str, Any]:
-        """Return the entries of run.json that the plan determines: the hash of the prompt template."""
+        """Return the entries of run.json that depend on the plan, such as the hash of the prompt template."""
         return {"template": template_hash(self.suite.skills)}
 
     async def complete(
@@ -90,13 +90,13 @@ class GenerationPlan:
 
 @dataclass(frozen=True, kw_only=True)
 class RoundPlan(GenerationPlan):
-    """Plans the completions of a round after the first (paper, section VI), which is a run in its own folder.
+    """Plans a later round of requests (paper, section VI). Each round is a run in its own folder.
 
-    It copies the programs that the check accepts, and regenerates or repairs the others.
+    A round copies the programs that the program check accepts, and requests new ones for the others.
 
     Args:
         number: the round, from 1; round 0 wrote the first programs.
-        repairs: whether the model sees the rejected program and its problems.
+        repairs: whether requests contain the rejected program and its problems, instead of the usual prompt.
         earlier: the completions of the previous round.
         problems: the problems of each rejected program, by completion key.
     """
@@ -112,11 +112,11 @@ class RoundPlan(GenerationPlan):
         return first.after(program, self.problems[key]) if self.repairs and program.strip() else first
 
     def sample(self, key: CompletionKey) -> int:
-        """Return the number of the sample, shifted for each round so that all random seeds differ."""
+        """Return the number of a completion's sample. It differs between rounds, as do the random seeds."""
         return key[2] + self.number * SAMPLE_STRIDE
 
     def given(self) -> Iterator[Completion]:
-        """Return the completions of the previous round that the check accepted."""
+        """Return the completions to copy: those of the previous round that the program check accepted."""
         return (one for key, one in self.earlier.items() if key not in self.problems)
 
     def folder(self, run: RunFolder) -> RunFolder:
@@ -147,7 +147,7 @@ def _run_metadata(
     if run.about.exists():
         earlier = load_json_object(run.about)
         if not isinstance(earlier.get("settings"), dict):
-            raise UserError("holds imported completions; name another folder", file=run.path)
+            raise UserError("has imported completions, so no others fit; name another folder", file=run.path)
         _expect_same(earlier, fixed, run.about)
     elif run.completions.exists() and run.completions.stat().st_size:
         why = "is missing, so the settings of the completions are unknown"
@@ -184,7 +184,7 @@ def _with_batch(
 
 
 def batches(metadata: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the request batches recorded in run.json, in order."""
+    """Return the batches of requests that run.json records, in order. `metadata` is its content."""
     found = metadata.get("batches")
     return [dict(one) for one in found if isinstance(one, dict)] if isinstance(found, list) else []
 
@@ -225,10 +225,10 @@ def timestamp() -> str:
 
 
 class RequestLog:
-    """Logs requests, to count those that an interruption left pending and that may be billed twice.
+    """Logs requests, to count those that an interruption left pending. They may be billed twice.
 
     Each request is logged before it is sent, and again if it ends without a completion. Any other request
-    without a completion was pending. Each command starts a new file, and deletes it at a normal end.
+    without a completion was pending. Each command starts a new file, and deletes the file at a normal end.
     """
 
     def __init__(self, path: Path, done: set[CompletionKey]) -> None:
@@ -272,7 +272,5 @@ class RequestLog:
                 case {"ended": [str(task), int(prompt), int(index)]}:
                     pending.discard((task, prompt, index))
                 case _:
-                    raise UserError(
-                        "this line is not a request; delete the file", file=self.path, line=number
-                    )
+                    raise UserError("the line is not a request; delete the file", file=self.path, line=number)
         return pending

@@ -18,8 +18,8 @@ from roboeval.suites.load import Scenario, Suite
 
 INSTRUCTION_NOT_RECORDED = "instruction not recorded"
 OF_SUITE = "the suite's current prompt is:"
-SUITE_CHANGED = "the suite has changed since this was judged"
-TRACE_CUT = "the trace was too long to save, so this cannot be explained"
+SUITE_CHANGED = "the suite has changed since the evaluation"
+TRACE_CUT = "the trace was too long to save, so the failure cannot be explained"
 TRACES_TOO_LONG = "the traces of this program are too long to explain this check"
 
 LOWERCASED_NOTE = "This suite lower-cases strings before running; shown as judged."
@@ -29,7 +29,7 @@ EVENT_SIZE = 10  # characters that each event counts for in addition to its text
 
 
 def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dict[str, Any]:
-    """Explain why a completion fails: the first failing world, and the error or failed check there."""
+    """Explain as JSON data why a completion failed: the first failing world, and the error or check there."""
     why = row["failure"]
     verdict = row["verdicts"][why["world"]]
     ending = {key: verdict[key] for key in ("world", "error", "line")}
@@ -44,7 +44,7 @@ def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dic
 def completion_data(
     row: Mapping[str, Any], completion: Completion, suite: Suite | None, *, ablated: bool = False
 ) -> dict[str, Any]:
-    """Describe a completion: its instruction, its program, and the steps and failed checks in each world."""
+    """Describe a completion as JSON data: instruction, program, and steps and failed checks in each world."""
     budget = ExplanationBudget()
     return {
         **{key: row[key] for key in (*KEY, "passed", "failure")},
@@ -73,7 +73,7 @@ def instruction_shown(recorded: str | None, of_suite: str | None) -> tuple[str |
 
 
 def failing_first(worlds: Iterable[Mapping[str, Any]]) -> list[tuple[int, Mapping[str, Any]]]:
-    """Number the worlds from 1, and put the failing ones first."""
+    """Return the worlds with their numbers, which start at 1. Failing worlds come first."""
     return sorted(enumerate(worlds, 1), key=lambda one: bool(one[1]["satisfied"]))
 
 
@@ -120,7 +120,7 @@ def _explained(
     require = () if scenario is None else scenario.require
     requirement = next((r for r in require if r.text == check), None)
     if requirement is None:
-        return {"explanation": f"{SUITE_CHANGED} and no longer has this requirement here", "step": None}
+        return {"explanation": f"{SUITE_CHANGED}: this world no longer has this requirement", "step": None}
     if not budget.covers(trace):
         return {"explanation": TRACES_TOO_LONG, "step": None}
     why = explain(requirement.formula, trace)
@@ -130,13 +130,13 @@ def _explained(
 
 
 def error_sentence(verdict: Mapping[str, Any]) -> str:
-    """Return the message of the error that ended a run, preceded by its line if the line is known."""
+    """Return the error that ended a run, such as `line 3: the door is locked`. The line may be unknown."""
     where = "" if verdict["line"] is None else f"line {verdict['line']}"
     return ": ".join(filter(None, (where, verdict["error"]["message"])))
 
 
 def first_lines(program: str) -> tuple[str, int]:
-    """Shorten a program for display, and return it with the number of omitted lines."""
+    """Return the first 1,000 lines of a program, with long lines shortened, and the number of other lines."""
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MAX_PROGRAM_LINES])
     return shown, max(0, len(lines) - MAX_PROGRAM_LINES)

@@ -85,22 +85,22 @@ FAILURE_CLASSES: Mapping[str, FailureClass] = {
 
 
 def label_of(name: str) -> str:
-    """Return the label of a class, or its name if it is unknown."""
+    """Return the label of a failure class, such as `failed check`, or `name` itself for an unknown class."""
     return FAILURE_CLASSES[name].label if name in FAILURE_CLASSES else name
 
 
 def plural_of(name: str) -> str:
-    """Return the plural label of a class, or its name if it is unknown."""
+    """Return the plural label, such as `failed checks`, or `name` itself for an unknown class."""
     return FAILURE_CLASSES[name].plural if name in FAILURE_CLASSES else name
 
 
 def classes_to_show(happened: Collection[str]) -> list[str]:
-    """Return the paper's three classes, so that runs are comparable, and all other classes that occurred."""
+    """Return the failure classes to show: always the paper's three, and others only if they `happened`."""
     return [name for name, one in FAILURE_CLASSES.items() if one.is_always_shown or name in happened]
 
 
 def no_program_sentence(failure: Mapping[str, Any]) -> str | None:
-    """Explain in a sentence why a reply contained no program, or return None for other failures."""
+    """Return a sentence that says why a reply contained no program, or None for another kind of failure."""
     if failure["class"] != NO_PROGRAM_CLASS:
         return None
     return next((words for kind, words in NO_PROGRAM_SENTENCES.items() if kind == failure["kind"]), "")
@@ -116,7 +116,7 @@ class Verdict:
     satisfied: bool
 
     def on(self, prompt: int) -> Verdict:
-        """Return the verdict for one prompt, without requirements that only other prompts ask for."""
+        """Return the verdict for one prompt, without the requirements that only other prompts ask for."""
         asked = tuple(requirement for requirement in self.failed if requirement.is_asked_by(prompt))
         if len(asked) == len(self.failed):
             return self
@@ -126,8 +126,8 @@ class Verdict:
 def failure_of_verdicts(verdicts: Sequence[Verdict]) -> Failure | None:
     """Return the failure of a completion in its first unsatisfied world, or None if it passes.
 
-    The failure is the error in that world or, if there is none, the first failed check. In a world where
-    programs may wait forever, reaching a limit is not an error.
+    The failure is the first failed check in that world, or else the error there. A run that ends in an error
+    has no failed checks, unless it reached a limit in a world where programs may wait forever.
     """
     for index, verdict in enumerate(verdicts):
         if not verdict.satisfied:

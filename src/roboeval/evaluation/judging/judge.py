@@ -45,13 +45,13 @@ def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
 
 
 def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
-    """Whether the requirements decide, because the run ended normally or was allowed to wait forever."""
+    """Return whether requirements decide on a run: it finished, or timed out in a world that allows this."""
     waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
     return waited or outcome.status is Status.FINISHED
 
 
 def are_met(outcome: Outcome, scenario: Scenario) -> tuple[bool, ...]:
-    """Return, for each requirement, whether the trace of a run satisfies it."""
+    """Return for each requirement of a world, in order, whether the trace of a run satisfies it."""
 
     def check() -> tuple[bool, ...]:
         return tuple([is_met(one, outcome.trace) for one in scenario.require])
@@ -61,7 +61,7 @@ def are_met(outcome: Outcome, scenario: Scenario) -> tuple[bool, ...]:
 
 
 def is_met(requirement: Requirement, trace: Trace) -> bool:
-    """Whether a trace satisfies a requirement. An inconclusive result counts as not satisfied."""
+    """Return whether a trace satisfies a requirement. An inconclusive result counts as not satisfied."""
     try:
         return holds(requirement.formula, trace)
     except Inconclusive:
@@ -102,7 +102,7 @@ def evaluate(
 def judgements(
     completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
 ) -> Iterator[tuple[Completion, bytes | None]]:
-    """Yield each completion and its judgement as JSON, or None and a warning if judging takes too long."""
+    """Yield each completion with its judgement as JSON, or warn and yield None if judging takes too long."""
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[Work]:
@@ -138,20 +138,19 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
     if (problem := find_key_fault(completion.key, suite)) is not None:
         raise UserError(problem)
     if ablated and suite.tasks[completion.task].ablation is None:
-        raise UserError(f'the task "{completion.task}" has no ablation')
+        raise UserError(f'the task "{completion.task}" has no ablation; select other tasks')
     worlds = suite.tasks[completion.task].judged_in(ablated=ablated)
     if completion.acted is not None and (ablated or completion.acted.world >= len(worlds)):
-        what = "an ablation" if ablated else f"world {completion.acted.world}"
-        raise UserError(
-            f"{name_of(completion.key)} is a mission of an agent, which cannot be judged in {what}"
-        )
+        unknown = f"took place in world {completion.acted.world}, which the task does not have"
+        what = "cannot be judged in an ablation" if ablated else unknown
+        raise UserError(f"the agent's mission {name_of(completion.key)} {what}; leave the mission out")
 
 
 class Ran(NamedTuple):
     """The outcomes of a program, one for each world in which it is judged."""
 
     task: str
-    acted: Acted | None  # where an agent acted; None for a program, which is judged in all worlds
+    acted: Acted | None  # the world of an agent's mission; None for a program, which is judged in all worlds
     outcomes: Sequence[Outcome]
 
 
@@ -162,7 +161,7 @@ def _scenarios(suite: Suite, task: str, acted: Acted | None, *, ablated: bool) -
 
 
 def run_in_worlds(suite: Suite, worker: Worker, works: Sequence[Work], *, ablated: bool) -> list[Ran]:
-    """Run programs in the worlds of their tasks, and missions of agents in the worlds where they acted."""
+    """Run each program in all worlds of its task, and each mission of an agent only in its own world."""
     planned = [
         (task, program, Acted(int(where[0]), where[1]) if where else None) for task, program, *where in works
     ]
@@ -198,7 +197,7 @@ def run_in(worker: Worker, program: str, scenarios: Iterable[Scenario], suite: S
 
 
 def judge_outcomes(suite: Suite, ran: Ran, *, ablated: bool) -> tuple[bytes, ...] | None:
-    """Return the judgement on a program for each prompt as JSON, or None if judging takes too long."""
+    """Return the judgement on a program for each prompt, as JSON, or None if judging takes too long."""
     outcomes, scenarios = ran.outcomes, _scenarios(suite, ran.task, ran.acted, ablated=ablated)
 
     def compute() -> tuple[bytes, ...]:
@@ -235,7 +234,7 @@ class ResultCache(Generic[CachedResult]):
         runs: Iterable[Outcome],
         compute: Callable[[], CachedResult],
     ) -> CachedResult:
-        """Return the cached result for the runs, or compute it. The entry keeps `keep_alive` alive."""
+        """Return the cached result for `key`, or compute it. `keep_alive` keeps the ids in the key valid."""
         known = self._known.get(key)  # another thread may clear the cache at any moment
         if known is not None:
             return known[0]

@@ -29,9 +29,9 @@ FAILED_PREFIX = b'{"passed": false, '  # how `judgement` starts a failed judgeme
 
 
 def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
-    """Replace the failure in a judgement if the reply has no program, or if an agent never called a skill.
+    """Return a judgement with the true failure, if the reply has no program or the agent called no skill.
 
-    Running the reply ends in an error or a failed check, but that is not why the completion fails.
+    Without this, the failure would be the error or failed check that results from running the reply.
     """
     if not judgement_json.startswith(FAILED_PREFIX):
         return judgement_json
@@ -47,7 +47,7 @@ def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
 
 
 def row_line(completion: Completion, judgement_json: bytes) -> bytes:
-    """Return a completion's row as a line of JSON: its key and hash, followed by its judgement."""
+    """Return a completion's row as a line of JSON: its key, its program's hash, and its judgement."""
     identity = {
         "task": completion.task,
         "prompt": completion.prompt,
@@ -59,7 +59,7 @@ def row_line(completion: Completion, judgement_json: bytes) -> bytes:
 
 
 def judgements_for(verdicts: list[Verdict], prompts: int) -> tuple[bytes, ...]:
-    """Return the judgement on a program for each prompt. Equal judgements are the same object."""
+    """Return the judgement for each of `prompts` prompts, as JSON. Equal judgements are the same object."""
     known_judgements: list[tuple[list[Verdict], bytes]] = []
     chosen = []
     for prompt in range(prompts):
@@ -98,7 +98,7 @@ def verdict_data(verdict: Verdict) -> dict[str, Any]:
 
 
 def limit_size(judgement: Mapping[str, Any]) -> bytes:
-    """Return a judgement as JSON that fits into a row. Each world's trace is cut to an equal share."""
+    """Return a judgement as JSON. If it is too long for a row, cut the traces: worlds get equal shares."""
     whole = _json(judgement)
     verdicts = judgement["verdicts"]
     most = max(ROW_BYTES, WORLD_BYTES * len(verdicts)) - ROW_HEADER_BYTES

@@ -13,12 +13,12 @@ CLOCK_CHECKS = 100  # number of clock checks before the limit; each also lets ot
 
 
 class TimeLimitExceeded(Exception):  # noqa: N818 - a signal, not an error
-    """Raised in the block when the limit is reached."""
+    """Raised by `time_limit` in its block when the processor time is used up."""
 
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Limit the processor time, in seconds, of the block. In other threads than the main one, do nothing."""
+    """Raise TimeLimitExceeded in the block after `seconds` of processor time, if this is the main thread."""
     if threading.current_thread() is not threading.main_thread():  # only the main thread receives signals
         yield
         return

@@ -32,7 +32,7 @@ class Acted(NamedTuple):
     """The only world in which an agent carried out a mission, and how the mission ended."""
 
     world: int  # the index of the world in its task
-    ending: str  # one of `ENDINGS`
+    ending: str  # one of `ENDINGS`, such as `TurnLimit`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ class Completion:
         index: the number of the sample, from 0, below a billion.
         program: the cleaned source text, which is judged unchanged.
         instruction: the instruction in the prompt, or None if it was not recorded.
-        model: the name of the model.
+        model: the name of the model, or None if it was not recorded.
         more: other entries of the row, such as `usage`, `raw_reply` and `finish_reason`.
 
     Raises:
@@ -69,9 +69,9 @@ class Completion:
         for name in ("task", "program", "instruction", "model"):
             text = getattr(self, name)
             if not isinstance(text, str) and (text is not None or name in REQUIRED):
-                raise UserError(f"the {name} is {text!r}, not a string")
+                raise UserError(f"the {name} is {text!r}, but it must be a string")
         if "world" in self.more and self.acted is None:
-            raise UserError(f'"world" or "ending" of a mission is invalid; endings are {", ".join(ENDINGS)}')
+            raise UserError(f'a mission needs a "world" from 0 and an "ending": {", ".join(ENDINGS)}')
         if (kind := self.more.get(NO_PROGRAM_COLUMN)) not in (None, *NO_PROGRAM_KINDS):
             raise UserError(
                 f'"{NO_PROGRAM_COLUMN}" is {kind!r}; use null or one of {", ".join(NO_PROGRAM_KINDS)}'
@@ -79,12 +79,12 @@ class Completion:
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Completion:
-        """Create a completion from a row. Raise UserError if an entry is missing or invalid."""
+        """Create a completion from a row of a file. Raise UserError if an entry is missing or invalid."""
         more = dict(row)
         known = {name: more.pop(name) for name in FIELDS if name in more}
         for name in REQUIRED:
             if name not in known:
-                raise UserError(f'"{name}" is missing')
+                raise UserError(f'the entry "{name}" is missing; a row looks like {EXAMPLE}')
         return cls(**known, more=more)
 
     @property
@@ -95,7 +95,7 @@ class Completion:
 
     @property
     def key(self) -> CompletionKey:
-        """Return the task, prompt and index, which are unique in a run."""
+        """The task, prompt and index, which together identify the completion in its run."""
         return self.task, self.prompt, self.index
 
     @property
@@ -123,7 +123,7 @@ class Completion:
 
     @property
     def turns(self) -> int:
-        """Return the number of model replies: 1 for a program, often more for a mission of an agent."""
+        """The number of the model's replies: 1 for a program, often more for a mission of an agent."""
         turns = self.more.get("turns", 1)
         return turns if type(turns) is int else 1
 
@@ -157,12 +157,12 @@ def row_for(key: CompletionKey, instruction: str, model: str, more: Mapping[str,
 def read_completions(
     path: str | PathLike[str], suite: Suite | None = None, *, growing: bool = False
 ) -> Iterator[Completion]:
-    """Read completions from a file of JSON lines.
+    """Read the completions in a file of JSON lines, one after another.
 
     Args:
         path: the file.
         suite: the suite whose tasks and prompts are allowed; any by default.
-        growing: whether to ignore an incomplete last line, because the file is still being written.
+        growing: whether to ignore an incomplete last line, because a process may still write to the file.
 
     Raises:
         UserError: the file is missing or empty, or a row is invalid, unknown to the suite, or a duplicate.
@@ -177,7 +177,7 @@ def read_completions(
         except UserError as error:
             raise UserError(error.sentence, file=path, line=number) from None
     if not seen:
-        raise UserError("contains no completion", file=path)
+        raise UserError(f"contains no completion; a row looks like {EXAMPLE}", file=path)
 
 
 def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completion | None:
@@ -211,11 +211,11 @@ def _is_of_other(completion: Completion, suite: Suite) -> str | None:
 def _expect_new(key: CompletionKey, seen: dict[CompletionKey, int], number: int) -> None:
     first_line = seen.setdefault(key, number)
     if first_line != number:
-        raise UserError(f"duplicates {name_of(key)} on line {first_line}; remove one of the two")
+        raise UserError(f"duplicates {name_of(key)} on line {first_line}; remove one of the two lines")
 
 
 def check_length(row: Mapping[str, Any], file: str | None) -> None:
-    """Raise UserError if a row is too long to be copied into a run."""
+    """Raise UserError, about this `file` if it is known, if a row is too long to be copied into a run."""
     if len(to_line(row)) > MAX_ROW:
         raise UserError(f"this row is longer than {MAX_ROW:,} bytes; shorten the program", file=file)
 
@@ -229,7 +229,7 @@ def find_key_fault(key: CompletionKey, suite: Suite) -> str | None:
     prompt: object = key[1]
     if isinstance(prompt, bool) or not hasattr(prompt, "__index__"):  # NumPy integers are allowed
         return f"the prompt is {prompt!r}, not a whole number; {there_are}"
-    return None if 0 <= key[1] < len(task.prompts) else f"{name_of(key)}: {there_are}"
+    return None if 0 <= key[1] < len(task.prompts) else f'"{key[0]}" has no prompt {prompt}; {there_are}'
 
 
 def name_of(key: CompletionKey) -> str:
@@ -243,7 +243,7 @@ def how_many(count: int) -> str:
 
 
 def recorded_suffix(models: Collection[str | None]) -> str:
-    """Return ` (programs written by hand)` for a title if models are recorded, or else an empty string."""
+    """Return ` (programs written by hand)` for a title if any model is recorded, or else an empty string."""
     recorded = [model for model in models if model is not None and model.startswith("recorded:")]
     if not recorded:
         return ""

@@ -9,7 +9,7 @@ from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.models.no_program import NO_PROGRAM_SENTENCES
 
 FINAL_ANSWER, ERROR, TIMEOUT = "answer", "error", "TimeoutError"
-"""Endings of agents and programs alike: a normal end, an error of the robot or a rule, and a limit."""
+"""Endings that programs have, too: a normal end, an error of the robot or a house rule, and a limit."""
 
 NO_CALL, GAVE_UP, OUTSIDE_CONTRACT = "NoCall", "GaveUp", "OutsideContract"
 UNKNOWN_TOOL, WRONG_ARGUMENTS, SEVERAL_CALLS = "UnknownTool", "WrongArguments", "SeveralCalls"
@@ -37,9 +37,10 @@ _NORMAL = {FINAL_ANSWER, ERROR, NO_CALL}
 
 
 def apply_ending(outcome: Outcome, ending: str) -> Outcome:
-    """Return the outcome of an agent's mission. A mission that ended badly, such as by giving up, fails.
+    """Return the outcome of an agent's mission, from the outcome of a program with the same calls.
 
-    `outcome` is that of a program with the same calls. A limit is a timeout; other bad endings are errors.
+    If that program finished, the mission fails with a timeout if its ending is a limit, or with an error of
+    the agent if its ending is a mistake, such as giving up. Otherwise, the outcome is unchanged.
     """
     if ending in _NORMAL or outcome.status is not Status.FINISHED:
         return outcome

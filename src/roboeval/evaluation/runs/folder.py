@@ -29,7 +29,7 @@ class RunFolder:
 
     @property
     def completions(self) -> Path:
-        """Return the path of the completions."""
+        """Return the path of completions.jsonl."""
         return self.path / COMPLETIONS
 
     @property
@@ -44,7 +44,7 @@ class RunFolder:
 
     @property
     def turns(self) -> Path:
-        """Return the path of the log of turns, if the model acts as an agent."""
+        """Return the path of turns.jsonl, the log of a model's replies as an agent."""
         return self.path / "turns.jsonl"
 
     def rows(self, key: str) -> Path:
@@ -68,12 +68,12 @@ class RunFolder:
         return self.path / "clarify" / key
 
     def judged_by(self) -> list[str]:
-        """Return the sorted names of the evaluations. The suffix of an ablation is left out."""
+        """Return the sorted names of the evaluations, such as `plus`, without the suffix of an ablation."""
         keys = (path.stem for path in self.rows("").parent.glob("*.jsonl"))
         return sorted({key.removesuffix(ABLATED) for key in keys})
 
     def read(self, suite: Suite | None = None) -> Iterator[Completion]:
-        """Read the completions, which must belong to the suite if one is given."""
+        """Read the completions of the run. Raise UserError if one does not belong to the given suite."""
         return read_completions(self.completions, suite, growing=True)
 
     @contextlib.contextmanager
@@ -91,9 +91,7 @@ class RunFolder:
             raise UserError(f"cannot be written ({error.strerror})", file=self.path) from None
         if not _locked(descriptor):
             os.close(descriptor)
-            raise UserError(
-                "another process is writing to this run; wait until it has finished", file=self.path
-            )
+            raise UserError("another process is writing to this run; wait until it is done", file=self.path)
         try:
             for folder in made:
                 sync_folder(folder.parent)
@@ -110,7 +108,7 @@ class RunFolder:
 
     @property
     def is_being_written(self) -> bool:
-        """Whether a process is writing to this run. The check holds the lock briefly, so writers may wait."""
+        """Whether a process is writing to this run. The check locks the run briefly, so a writer may wait."""
         flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
         try:
             descriptor = os.open(self.path / ".lock", flags)
@@ -136,7 +134,7 @@ class RunFolder:
             )
 
     def keep(self, completions: Sequence[Completion]) -> None:
-        """Copy completions into this run. Raise UserError, and change nothing, if it holds different ones."""
+        """Copy completions into this run. Raise UserError, and change nothing, if it has different ones."""
         models = {completion.model for completion in completions}
         with self.writing():
             if self.completions.exists():
@@ -172,14 +170,14 @@ def _locked(descriptor: int) -> bool:
 
 
 def load_json_object(path: Path) -> dict[str, Any]:
-    """Read a JSON object from a file such as run.json."""
+    """Read a JSON object from a file such as run.json. Raise UserError if the file contains anything else."""
     text = read_text(path)
     try:
         data = json.loads(text)
     except (ValueError, RecursionError):
         data = None
     if not isinstance(data, dict):
-        raise UserError("is not a JSON object", file=path)
+        raise UserError("is not a JSON object; repair or remove the file", file=path)
     return data
 
 
@@ -204,19 +202,19 @@ def evaluation_key(suite: Suite, *, ablated: bool) -> str:
 def tasks_to_judge(
     suite: Suite, names: str | None, *, ablated: bool
 ) -> tuple[frozenset[str] | None, tuple[str, ...]]:
-    """Parse task names, and return the tasks to judge (None for all) and those without an ablation."""
+    """Parse names such as `A, B`. Return the tasks to judge (None: all) and those without an ablation."""
     wanted = [*suite.tasks] if names is None else [suite.task(name.strip()).name for name in names.split(",")]
     if not ablated:
         return (None if names is None else frozenset(wanted)), ()
     left = tuple(name for name in wanted if suite.tasks[name].ablation is None)
     kept = frozenset(wanted) - frozenset(left)
     if not kept:
-        raise UserError(f"none of {', '.join(wanted)} has an ablation")
+        raise UserError(f"none of {', '.join(wanted)} has an ablation; select other tasks")
     return kept, left
 
 
 def with_judged_worlds(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
-    """Return the suite with the number and seed of worlds that KEY.json says the run was judged with."""
+    """Return the suite with the worlds (number and seed) in which the run was judged, as KEY.json records."""
     path = run.manifest(evaluation_key(suite, ablated=ablated))
     drawn = suite.worlds, suite.seed
     if suite.worlds is None or not path.is_file():
@@ -238,7 +236,7 @@ def evaluation_of(
     suite = with_judged_worlds(run, suite, ablated=ablated)
     key = evaluation_key(suite, ablated=ablated)
     if not run.completions.is_file():
-        raise UserError("is not a run, because it has no completions.jsonl", file=path)
+        raise UserError("is not a run, because it contains no completions.jsonl; choose a run", file=path)
     if not run.rows(key).is_file():
         others = ", ".join(name for name in run.judged_by() if name != suite.name)
         only = f' as "{key}", only as {others}; choose with --suite and --rules, or' if others else ";"

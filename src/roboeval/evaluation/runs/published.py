@@ -95,7 +95,7 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
         nonlocal unpacked
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             # Other compression methods may unpack chunks of any size.
-            raise UserError('uses an unusual compression; use "deflate"', file=name)
+            raise UserError('is compressed in an unusual way; create the zip with "deflate"', file=name)
         try:
             with archive.open(member) as file:
                 data = file.read(MAX_ROW + 1)
@@ -103,7 +103,7 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
             raise UserError(f"is not a readable zip ({error})", file=path) from None
         unpacked += len(data)
         if unpacked > MAX_UNPACKED:
-            raise UserError(f"unpacks to more than {MAX_UNPACKED:,} bytes", file=path)
+            raise UserError(f"unpacks to more than {MAX_UNPACKED:,} bytes; split the zip", file=path)
         return decode_text(data, name, limit=MAX_ROW)
 
     for member in archive.infolist():
@@ -127,7 +127,7 @@ def _assigned(text: str, name: str) -> dict[str, str]:
         if isinstance(target, ast.Name) and target.id in ("prompt", "completion")
     }
     if "completion" not in texts:
-        raise UserError("does not assign a string to `completion`", file=name)
+        raise UserError("does not assign a string to `completion`; add this line", file=name)
     return texts
 
 

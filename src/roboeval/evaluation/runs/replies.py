@@ -36,7 +36,7 @@ def reply_data(completion: Completion) -> dict[str, Any] | None:
 
 
 def reply_numbers(completion: Completion) -> dict[str, float | None]:
-    """Return the token counts of a reply and its latency in seconds. Each is None if it was not recorded."""
+    """Return a reply's token counts and its `latency_s` in seconds. Each is None if it was not recorded."""
     more = completion.more
     usage = more.get("usage")
     usage = usage if isinstance(usage, dict) else {}
@@ -62,6 +62,6 @@ def reply_facts(reply: Mapping[str, Any]) -> list[str]:
 
 
 def number_or_none(value: Any, kind: type | UnionType) -> float | None:  # noqa: ANN401 - JSON has no types
-    """Return a value from a row if it is a nonnegative number, or None."""
+    """Return a value from a row if it is a number of this type, from 0 to a trillion, or else None."""
     is_number = isinstance(value, kind) and not isinstance(value, bool)
     return value if is_number and 0 <= value <= MAX_RECORDED else None

@@ -28,7 +28,7 @@ from roboeval.evaluation.runs.scope import Coverage, JudgingScope
 from roboeval.evaluation.runs.table import Price, TableBuilder, keys_where, with_answers, with_cost
 from roboeval.suites.load import ABLATED, Suite, load_suite
 
-REPLACED = "was replaced in the meantime; try again"
+REPLACED = "was replaced by another process; try again"
 
 
 def load_results(
@@ -50,11 +50,11 @@ def load_results(
         A table sorted by completion and world. These columns repeat in all rows of a completion: `task`,
         `prompt`, `index`, `model`, `program_sha256`, `passed`, the first failure (`failure_class`,
         `failure_kind`, `failure_world`, `failure_check`), `instruction`, `program`, `no_program`,
-        `finish_reason`, `cut_off`, `input_tokens`, `output_tokens`, `reasoning_tokens`, `latency_s`, `cost`
-        and `accepted` (whether the check found no problem; null if the program was not checked). These
-        columns describe a world:
-        `world_number`, `world`, `satisfied`, `status`, `error_kind`, `error_message`, `line`, `failed_checks`
-        (joined by "; "), `category` (of the first failed check) and `events`. Numbers count from 0.
+        `finish_reason`, `cut_off`, `input_tokens`, `output_tokens`, `reasoning_tokens`, `latency_s`, `mode`,
+        `ending`, `mission_world`, `turns`, `tool_errors`, `cost` and `accepted` (whether the check found no
+        problem; null if the program was not checked). These columns describe a world: `world_number`,
+        `world`, `satisfied`, `status`, `error_kind`, `error_message`, `line`, `failed_checks` (joined by
+        "; "), `category` (of the first failed check) and `events`. Prompts, indexes and worlds count from 0.
 
     Raises:
         UserError: the run or suite does not exist, the suite has not judged the run, a file is damaged, or
@@ -69,7 +69,7 @@ class Results:
     """One evaluation of a run, with its table of verdicts."""
 
     run: RunFolder
-    key: str | None
+    key: str | None  # the name of the evaluation, such as `plus`; None if the run has not been judged
     suite: Suite | None  # the suite that judged, or None if it is not available
     manifest: Mapping[str, Any]  # the content of KEY.json
     about: Mapping[str, Any]  # the content of run.json
@@ -90,7 +90,7 @@ class Results:
 
     @property
     def known_suite(self) -> Suite:
-        """Return the suite. The evaluation must have been read with one."""
+        """The suite that judged the run. It must have been given when the results were read."""
         assert self.suite is not None, "only web pages show runs without their suite"
         return self.suite
 
@@ -104,7 +104,7 @@ class Results:
 
     @cached_property
     def scope(self) -> JudgingScope:
-        """Return the completions that the evaluation should judge."""
+        """The numbers of the completions that the evaluation should judge, by task and by how they ended."""
         return JudgingScope.of(self.completions.values(), self.tasks, self.about, self.suite)
 
     @property
@@ -119,11 +119,11 @@ class Results:
 
     @property
     def programs(self) -> Mapping[CompletionKey, str]:
-        """Return the programs of all completions."""
+        """The source of each program, by the key of its completion."""
         return {key: completion.program for key, completion in self.completions.items()}
 
     def row(self, key: CompletionKey) -> Row:
-        """Read a row from the file, with all its traces. Raise UserError if the file was replaced."""
+        """Read the row of a completion with all its traces. Raise UserError if the file has been replaced."""
         at, size = self.places[key]
         path = self.run.rows(self.key or "")
         try:

@@ -50,8 +50,8 @@ Numbered: TypeAlias = list[Annotated[list[int | str | None], msgspec.Meta(min_le
 class WorldVerdict(TypedDict):
     """The judgement in one world.
 
-    The last five entries describe the events of `trace`. If the trace is too long for the row, it ends early,
-    and `cut` describes the rest.
+    The function `circumstances` describes `places`, `holding`, `to` and `destinations`. If the trace is too
+    long for the row, only its first events are there, and `cut` counts the others.
     """
 
     world: str
@@ -76,7 +76,7 @@ class Row(TypedDict):
         prompt: the number of the phrasing, from 0.
         index: the number of the sample, from 0.
         program_sha256: the hash of the program that was judged.
-        mission_world: the index of the only world in which it was judged, since an agent acted there.
+        mission_world: the index of the only world that was judged, if an agent acted there; else no entry.
         passed: whether the program satisfies the requirements in all worlds.
         failure: the first failure, or None if the program passed.
         verdicts: the judgement in each world, in order.
@@ -98,13 +98,13 @@ def key_of(row: Mapping[str, Any]) -> CompletionKey:
 
 
 def failure_of(row: Row) -> Failure:
-    """Return the failure in a row, whose program must have failed."""
+    """Return the failure that a row records. The program must have failed."""
     assert row["failure"] is not None, "this program passed"
     return row["failure"]
 
 
 def decode_row(line: bytes) -> Row:
-    """Decode and validate a row of an evaluation."""
+    """Decode a line of an evaluation. Raise UserError if the line is not a valid row."""
     try:
         data = _decoded(line)
         row = msgspec.convert(data, Row)
@@ -152,7 +152,11 @@ class LocatedRow:
 def read_lines_of(
     path: Path, manifest: Mapping[str, Any], *, seal: Seal | None = None, task: str | None = None
 ) -> Iterator[LocatedRow]:
-    """Read the rows of all tasks or of one. Ignore an incomplete last line. `seal` hashes all lines."""
+    """Yield the rows of an evaluation, of all tasks or of one. Ignore an incomplete last line.
+
+    `seal` counts and hashes all lines. Raises UserError if a line is damaged, or if the file differs from the
+    seal in `manifest`, the content of KEY.json.
+    """
     name = b"" if task is None else to_line(task).removesuffix(b"\n")
     seal = seal or Seal()
     at = 0
@@ -171,22 +175,22 @@ def read_lines_of(
 
 
 def take_judged(left: dict[CompletionKey, Completion], line: LocatedRow, file: Path) -> Completion:
-    """Remove the completion that a row judges from `left`, and return it.
+    """Remove the completion that a row judges from `left`, and return the completion.
 
-    Raises UserError if the completion is not there, since an evaluation must fit the run's completions.
+    Raises UserError if `left` does not contain the completion, or if its program has changed since.
     """
     key = key_of(line.row)
     completion = left.pop(key, None)
     if completion is not None and completion.program_sha256 == line.row["program_sha256"]:
         return completion
-    sentence = f"this row judges {name_of(key)}, which is not in the run, or which an earlier row judges"
+    sentence = f"this row judges {name_of(key)}, which the run lacks or an earlier row judges"
     if completion is not None:
         sentence = f"the program of {name_of(key)} has changed since it was judged"
     raise UserError(f"{sentence}; --redo starts over", file=file, line=line.number)
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
-    """Yield the task and hash of each checked program, with the problems that the check found."""
+    """Yield the task and hash of each checked program, with its problems in sentences, if there are any."""
     for number, row in read_rows(path, growing=True):
         match row:
             case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
@@ -196,13 +200,13 @@ def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
 
 
 class Seal:
-    """The row count and hash of an evaluation's file. KEY.json stores them, so that changes are noticed."""
+    """Counts and hashes the rows of an evaluation. KEY.json stores the result, to reveal later changes."""
 
     def __init__(self) -> None:
         self._count, self._hash = 0, hashlib.sha256()
 
     def add(self, line: bytes) -> None:
-        """Add a line that was read or written."""
+        """Count and hash a line that was read or written."""
         self._count += bool(line.strip())
         self._hash.update(line)
 
@@ -211,10 +215,10 @@ class Seal:
         return {"rows": self._count, "sha256": self._hash.hexdigest()}
 
     def is_broken(self, manifest: Mapping[str, Any]) -> bool:
-        """Whether the rows differ from those recorded when the evaluation was finished."""
+        """Return whether the rows differ from those that the content of KEY.json, `manifest`, describes."""
         return is_sealed(manifest) and any(manifest.get(name) != value for name, value in self.data().items())
 
 
 def is_sealed(manifest: Mapping[str, Any]) -> bool:
-    """Whether the content of KEY.json belongs to a finished evaluation."""
+    """Return whether `manifest`, the content of KEY.json, belongs to a finished evaluation."""
     return "rows" in manifest or "sha256" in manifest

@@ -49,7 +49,7 @@ class JudgingScope:
     requested: Mapping[str, int] | None = None  # requested completions of each task, from run.json
     cut_off: int = 0  # replies for selected tasks that ended at the token limit
     limit: int | None = None  # the token limit, if it was set
-    endings: Mapping[str, int] = field(default_factory=dict)  # of an agent's missions, with their numbers
+    endings: Mapping[str, int] = field(default_factory=dict)  # the number of missions by ending
     turns: int = 0  # replies in all missions
 
     @classmethod
@@ -60,7 +60,7 @@ class JudgingScope:
         about: Mapping[str, Any] = {},
         suite: Suite | None = None,
     ) -> JudgingScope:
-        """Count completions. Models, cut-off replies and missions count for `tasks` only; None means all."""
+        """Count completions. Models, cut-off replies and missions count only for `tasks`; None means all."""
         every = list(completions)
         selected = [one for one in every if tasks is None or one.task in tasks]
         missions = [(one.acted.ending, one.turns) for one in selected if one.acted is not None]
@@ -79,16 +79,16 @@ class JudgingScope:
 
     @property
     def total(self) -> int:
-        """Return the number of completions to judge."""
+        """Return the number of completions of the selected tasks."""
         return sum(n for task, n in self.completions.items() if self.selects(task))
 
     def selects(self, task: str) -> bool:
-        """Whether a task is selected."""
+        """Return whether a task is selected."""
         return self.tasks is None or task in self.tasks
 
     @property
     def missions_sentence(self) -> str | None:
-        """Return a sentence about the missions of an agent, or None if there are none."""
+        """A sentence about the turns and endings of an agent's missions, or None if there are no missions."""
         if not (count := sum(self.endings.values())):
             return None
         ended = ", ".join(f"{ending} {number:,}" for ending, number in Counter(self.endings).most_common())
@@ -117,7 +117,7 @@ class JudgingScope:
 
 
 def requested_of(about: Mapping[str, Any], suite: Suite | None) -> dict[str, int] | None:
-    """Return the number of requested completions of each task, or None if it was not recorded."""
+    """Return the number of completions of each task that run.json (`about`) requests, or None if unknown."""
     found = batches(about)
     if not found or suite is None:
         return None

@@ -35,9 +35,7 @@ def open_source(text: str, suite: Suite) -> Source:
     if text.partition(":")[0] == "recorded" and not path.exists():
         return Source([*recorded_completions(text, suite)])
     if not path.exists():
-        raise UserError(
-            "does not exist; name a run, a .jsonl file, or a folder or zip of .py files", file=path
-        )
+        raise UserError("does not exist; name a run, .jsonl file, or folder or zip of .py files", file=path)
     if (path / COMPLETIONS).is_file():
         return Source([*RunFolder(path).read(suite)], RunFolder(path))
     if path.is_dir() or path.suffix == ".zip":
@@ -51,7 +49,7 @@ MAX_ANSWER_BYTES = 10 * MAX_ROW  # an answer may contain more than we keep
 
 
 def is_answers(path: Path) -> bool:
-    """Whether a file starts like requests to a batch endpoint, or like answers from one."""
+    """Return whether a file starts like requests to a batch endpoint, or like answers from one."""
     if not path.is_file():
         return False
     _, line = next(read_lines(path, limit=MAX_ANSWER_BYTES), (0, b""))

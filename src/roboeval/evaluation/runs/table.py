@@ -66,19 +66,19 @@ WORLD_COLUMNS: Mapping[str, type[pl.DataType]] = {
 
 
 class Price(NamedTuple):
-    """The prices of a million input and output tokens."""
+    """The prices of a million input tokens and of a million output tokens, in any currency."""
 
     input: float
     output: float
 
     @classmethod
     def read(cls, text: str) -> Price:
-        """Parse `INPUT/OUTPUT`. Raise UserError unless both are numbers from 0 to a million."""
+        """Parse a text such as `2.5/10`. Raise UserError if it is not two numbers below a million."""
         with suppress(TypeError, ValueError):
             price = cls(*map(float, text.split("/")))
             if all(0 <= number < MILLION for number in price):
                 return price
-        raise UserError(f'"{text}" is not a price; write INPUT/OUTPUT, the prices per million tokens')
+        raise UserError(f'"{text}" is not a price; write INPUT/OUTPUT per million tokens, such as 2.5/10')
 
     def of(self, input_tokens: Tokens, output_tokens: Tokens) -> Tokens:
         """Compute the cost of tokens, given as numbers or as columns."""
@@ -91,12 +91,12 @@ def with_cost(table: pl.DataFrame, price: Price) -> pl.DataFrame:
 
 
 def keys_where(table: pl.DataFrame, condition: pl.Expr) -> list[CompletionKey]:
-    """Return the keys of the completions that meet a condition."""
+    """Return the keys of the completions whose first row meets a condition on the columns."""
     return [*table.filter(condition, pl.col("world_number") == 0).select(KEY).iter_rows()]
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
-    """Return the table with `accepted` filled in: whether the check found no problem in the program."""
+    """Return the table with `accepted` filled in: whether `problems`, by task and program hash, is empty."""
     names = ["task", "program_sha256"]
     answers = [(*key, not found) for key, found in problems.items()]
     accepted = pl.DataFrame(
@@ -107,7 +107,7 @@ def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequenc
 
 
 class TableBuilder:
-    """Builds the table that `load_results` describes from the rows of an evaluation.
+    """Builds the table of `load_results` from the rows of an evaluation.
 
     `categories` maps each pair of a task and a requirement's text to the requirement's category.
     """
@@ -184,7 +184,7 @@ def _known_of(written: Completion) -> dict[str, Any]:
 
 
 def storable(text: str) -> str:
-    """Escape the lone surrogates of a string, since tables store strings in UTF-8, which has none."""
+    """Escape the lone surrogates of a string, because tables store UTF-8, which cannot contain them."""
     return text.encode(errors="backslashreplace").decode()
 
 
@@ -193,17 +193,17 @@ TABLE_BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # the first bytes of 
 
 
 def kind_of(path: Path | None) -> str:
-    """Return the table format for the ending of a file name, by default csv."""
+    """Return `parquet` for a file name with this ending, or `csv` for any other name and for None."""
     ending = "" if path is None else path.suffix.removeprefix(".").lower()
     return ending if ending in TABLE_FORMATS else TABLE_FORMATS[0]
 
 
 def write_table(frame: pl.DataFrame, path: Path, kind: str) -> None:
-    """Write a table to a file as csv or parquet. Equal tables produce equal bytes."""
+    """Write a table to a file. `kind` is `csv` or `parquet`. Equal tables produce equal bytes."""
     if kind not in TABLE_FORMATS:
         raise UserError(f'unknown format "{kind}"; choose one of {", ".join(TABLE_FORMATS)}')
     if not path.parent.is_dir():
-        raise UserError("there is no such folder", file=path.parent)
+        raise UserError("the folder does not exist; create it first", file=path.parent)
     content = io.BytesIO()
     if kind == "csv":
         # Spreadsheets treat such cells as formulas, so OWASP recommends prepending an apostrophe.

@@ -12,7 +12,7 @@ CIRCUMSTANCES = ("places", "holding", "to", "destinations")
 
 
 def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
-    """Return when the robot's room, what it holds and whom it asks change. Events are numbered from 1.
+    """Return at which events (from 1) the robot's room, the thing it holds or the person it asks changes.
 
     `places` is always present. The other entries are present only if they are not empty:
 
@@ -54,7 +54,7 @@ def _changes_by_kind(trace: Trace) -> list[list[Any]]:
 
 
 def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
-    """Cut a verdict, given as data, to its first `count` events, but keep the place after the last one."""
+    """Cut a verdict (as JSON data) to its first `count` events. Keep the place after the last of them."""
     known = {name: verdict[name] for name in CIRCUMSTANCES if name in verdict}
     kept = {
         name: [entry for entry in entries if entry[0] <= count + (name == "places")]

@@ -26,20 +26,20 @@ class TurnLog:
                 if (key := key_of(row)) not in done:
                     self._replies.setdefault(key, []).append(msgspec.convert(row["reply"], Reply))
             except (KeyError, TypeError, msgspec.ValidationError):
-                sentence = "this line is not a turn; name another folder"
+                sentence = "this line is not a reply to an agent; name another folder"
                 raise UserError(sentence, file=path, line=number) from None
         self._file = Appender(path)
 
     def replies(self, key: CompletionKey) -> list[Reply]:
-        """Return the replies that were saved for a mission, or none if its completion has been saved."""
+        """Return the saved replies of a mission, or an empty list if its completion has been saved."""
         return list(self._replies.get(key, ()))
 
     def forget(self, key: CompletionKey) -> None:
-        """Forget a mission whose completion has been saved."""
+        """Forget the replies to a mission whose completion has been saved. The file keeps them."""
         self._replies.pop(key, None)
 
     async def keep(self, key: CompletionKey, reply: Reply) -> None:
-        """Append a reply to the file, and wait until it is on disk."""
+        """Append a reply to the file, and wait until the reply is on disk."""
         self._replies.setdefault(key, []).append(reply)
         self._file.append(to_line({**dict(zip(KEY, key, strict=True)), "reply": asdict(reply)}))
         await asyncio.to_thread(self._file.sync)

@@ -29,8 +29,8 @@ FAMILY_SUITE_NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re
 def first_seed(split: str, seed: int, count: int, what: str) -> int:
     """Return the first of `count` consecutive seeds of a split, such as 30 for `train`, seed 3 and count 10.
 
-    With the same count, each `seed` gives entirely different ones. Raises UserError if the split does not
-    exist or a number is out of range. The message calls the counted items `what`.
+    With the same count, the results for different values of `seed` do not overlap. Raises UserError if the
+    split does not exist or a number is out of range. The message calls the counted items `what`.
     """
     if split not in FIRST_SEEDS:
         raise UserError(f'unknown split "{split}"; use {listed(list(FIRST_SEEDS))}')
@@ -82,7 +82,7 @@ class FamilyTasks:
 
 
 def family_tasks_named(name: str) -> FamilyTasks | None:
-    """Parse a suite name such as `families-test-7`, or return None for other names."""
+    """Parse a name such as `families-test-7`, or return None. Raise UserError if a part of it is wrong."""
     match = FAMILY_SUITE_NAME.fullmatch(name)
     if match is None:
         return None

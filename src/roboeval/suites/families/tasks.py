@@ -91,7 +91,7 @@ class TrainedTask:
         return self.suite.tasks[self.name].prompts
 
     def expect_prompt(self, index: int) -> None:
-        """Raise UserError if there is no prompt with this number."""
+        """Raise UserError if the task has no prompt with this number, from 0."""
         if not 0 <= index < len(self.prompts):
             raise UserError(f"{self.name} has no prompt {index}; use 0 to {len(self.prompts) - 1}")
 
@@ -103,7 +103,7 @@ def family_names() -> tuple[str, ...]:
 
 
 def family_file(family: str) -> Path:
-    """Return the file of a family, given its name or a `.yaml` file. Otherwise, raise UserError."""
+    """Return the file of a family, given its name or the file's path. Raise UserError if there is none."""
     if family.endswith(".yaml") and Path(family).is_file():
         return Path(family)
     if family not in family_names():
@@ -112,7 +112,7 @@ def family_file(family: str) -> Path:
 
 
 def trained_task(family: str, seed: int, *, worlds: int = TRAINING_WORLDS) -> TrainedTask:
-    """Generate the task of a family for a seed. The result is reproducible.
+    """Generate the task of a family for a seed. Equal arguments give equal tasks.
 
     Args:
         family: one of `family_names()`, or the path of a `.yaml` file, which is read only once.
@@ -202,7 +202,7 @@ def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
     def sample(words: Sequence[str], count: int) -> list[str]:
         left = [word for word in dict.fromkeys(words) if word not in used]
         if len(left) < count:
-            raise file.wrong(f"only {len(left)} words are left, but {count} are needed", "choose", name)
+            raise file.wrong(f"{count} words are needed, but {len(left)} are left; use fewer", "choose", name)
         some = random.sample(left, count)
         used.update(some)
         return some
@@ -214,7 +214,7 @@ def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
             least, most = int(match[1]), int(match[2])
             if not least <= most < len(NUMBER_WORDS):
                 raise file.wrong(
-                    "the range is not valid; write two ascending numbers up to 10", "choose", name
+                    "the range is not valid; write ascending numbers up to 10, such as 2 to 4", "choose", name
                 )
             number = random.randint(least, most)
             yield from ((name, str(number)), (f"{name}_word", NUMBER_WORDS[number]))
@@ -286,5 +286,5 @@ def _words() -> Mapping[str, list[str]]:
 
 @cache
 def suite_file() -> SuiteFile:
-    """Return the version and the simulation settings that all families share."""
+    """Return the content of training.yaml: the version and the settings that all families share."""
     return YamlFile.read(FAMILY_FOLDER / "training.yaml").validate(SuiteFile)

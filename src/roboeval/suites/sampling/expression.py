@@ -62,7 +62,7 @@ def parse_cached(text: str) -> ast.expr:
 
 
 def evaluate(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - strings, numbers, lists of them
-    """Compute the value of an expression, given the values of names. Raise ExpressionError on failure."""
+    """Compute the value of an expression, given values of names. Raise ExpressionError if that fails."""
     try:
         return _checked_value(node, names)
     except ExpressionError:
@@ -107,7 +107,7 @@ def _compute(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR091
         case ast.Attribute(inner, name):
             whole = _checked_value(inner, names)
             if not isinstance(whole, SimpleNamespace) or name not in vars(whole):
-                why = "is not an attribute; people and things have only a name and a room"
+                why = "is not an attribute; people and things have, for example, name and room"
                 raise ExpressionError(f'".{name}" {why}')
             return getattr(whole, name)
         case ast.Subscript(inner, key):
@@ -146,7 +146,7 @@ def iterate_loop(loop: ast.comprehension, names: Names) -> Iterator[Names]:
         raise ExpressionError(f'"{ast.unparse(loop.target)}" is not a single name; write for NAME in ...')
     items = _checked_value(loop.iter, names)
     if isinstance(items, str) or not isinstance(items, Iterable):
-        raise ExpressionError(f'"{ast.unparse(loop.iter)}" is not a list')
+        raise ExpressionError(f'"{ast.unparse(loop.iter)}" is not a list; loop over a list such as people')
     for item in items:
         each = {**names, loop.target.id: item}
         if all(_checked_value(test, each) for test in loop.ifs):

@@ -15,7 +15,7 @@ _TRIES = 12  # number of candidates tried for each combination
 
 
 def number_values(sizes: Mapping[str, int]) -> dict[str, range]:
-    """Number the values of all factors: sizes a=2 and b=3 give a `range(0, 2)` and b `range(2, 5)`."""
+    """Number the values of all factors: for a=2 and b=3, a has the numbers 0 and 1, and b has 2 to 4."""
     numbers: dict[str, range] = {}
     start = 0
     for factor in sorted(sizes):
@@ -25,14 +25,14 @@ def number_values(sizes: Mapping[str, int]) -> dict[str, range]:
 
 
 def sample_combinations(sizes: Mapping[str, int], count: int, random: Random) -> list[Combination]:
-    """Return combinations that cover all pairs of values, and random ones up to `count` in total."""
+    """Return combinations that cover all pairs of values, then random ones until there are `count`."""
     rows = cover_pairs(sizes, random)
     rows += [{name: random.randrange(size) for name, size in sizes.items()} for _ in range(count - len(rows))]
     return rows
 
 
 def cover_pairs(sizes: Mapping[str, int], random: Random) -> list[Combination]:
-    """Return few combinations that cover every pair of values, found by a greedy search."""
+    """Return few combinations that cover every pair of values. `sizes` counts the values of each factor."""
     if len(sizes) == 1:
         return [{factor: value} for factor, size in sizes.items() for value in range(size)]
     numbers = number_values(sizes)
@@ -55,7 +55,7 @@ def pairs_in(row: Mapping[str, int]) -> set[Pair]:
 
 
 def partners_of(pairs: Iterable[Pair]) -> Mapping[int, int]:
-    """Map each number to its partners in the pairs, as bits: partners 1 and 2 give 0b110."""
+    """Map each number to the set of its partners in the pairs, as bits: partners 1 and 2 give 0b110."""
     partners: dict[int, int] = defaultdict(int)
     for a, b in pairs:
         partners[a] |= 1 << b

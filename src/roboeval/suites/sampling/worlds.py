@@ -38,7 +38,7 @@ class Setting:
     rooms: tuple[str, ...]  # all rooms, in the order the robot lists them
 
     def room(self, name: str) -> str:
-        """Return the room of a person or thing, or an empty string if absent."""
+        """Return the room of a person or thing, or an empty string for one that is in no room."""
         room = str(self.chosen[f"{name}.in"])
         return "" if room == IN_NO_ROOM else room
 
@@ -64,7 +64,7 @@ class WorldSampler:
 
     @cached_property
     def factors(self) -> dict[str, tuple[FactorLevel, ...]]:
-        """Return the possible values of each factor, such as the rooms where Alice may be for `alice.in`."""
+        """Return the possible values by factor: for `alice.in`, these are the rooms where Alice may be."""
         found = {ROBOT_FACTOR: self._rooms(self.form.worlds.robot, ROBOT_FACTOR)}
         for name, person in self.form.worlds.people.items():
             found[f"{name}.in"] = self._rooms(person.where, "people", name, "in")
@@ -90,9 +90,9 @@ class WorldSampler:
         return _levels(where)
 
     def settings(self, count: int, seed: int) -> Iterator[Setting]:
-        """Yield the worlds set by hand (corners), then random worlds that cover all pairs of factors' values.
+        """Yield the corners (worlds set by hand), then random worlds that cover all pairs of factors' values.
 
-        At least `count` worlds are yielded, unless fewer exist.
+        There are at least `count` worlds, unless fewer different ones are found.
         """
         random = Random(f"{self.form.name} {seed}")  # noqa: S311 - not for cryptography
         corners = [self._corner(corner, number) for number, corner in enumerate(self.form.worlds.corners)]
@@ -158,7 +158,7 @@ class WorldSampler:
         return World(tuple(rooms), setting.start, setting.about, wait)
 
     def requirements(self, setting: Setting) -> Iterator[tuple[str, int]]:
-        """Yield the requirements of a world as text, each with the index of its entry in the file."""
+        """Yield each requirement of a world as text, with the index of its entry under `require`."""
         names = self._names(setting)
         for number, form in enumerate(self.form.require):
             with self._located("require", number):
