@@ -302,7 +302,7 @@ def test_faulty_file_is_an_error_with_its_line(tmp_path: Path, source: str) -> N
 @pytest.mark.parametrize(
     ("body", "message"),
     [
-        ("return 3", "wiggle returned 3, but it declares bool"),
+        ("return 3", "wiggle returned 3, but its function must return True or False"),
         ("sim.fail('Other')", 'wiggle declares no error "Other"'),
     ],
 )

@@ -37,5 +37,6 @@ def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # n
         ) from error
     asks = [one for one, parameter in zip(given, row.parameters, strict=True) if parameter.is_options]
     if (asks and result not in asks[0]) or not row.returns.fits(result):
-        row.wrong(f"{row.name} returned {result!r:.80}, but it declares {row.returns.annotation}")
+        must = "one of the given options" if asks else row.returns.words
+        row.wrong(f"{row.name} returned {result!r:.80}, but its function must return {must}")
     return result

@@ -151,7 +151,7 @@ class _Declaration:
         event = self.options.get("event") or self.name
         for word in (event, self.options.get("sets"), self.options.get("clears")):
             if word and (word in RTL_WORDS or iskeyword(word) or not word.isidentifier()):
-                self.wrong(f'formulas cannot use "{word}" as a name; choose another one')
+                self.wrong(f'formulas cannot use "{word}" as a name; choose another event or state')
 
     def parameters(self) -> tuple[Parameter, ...]:
         if iscoroutinefunction(self.does):
@@ -263,7 +263,7 @@ class _Declaration:
             )
         unusable = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
         if unusable:
-            self.wrong(f"{unusable[0]} of {self.name} cannot be a ROS field; use a-z, 0-9 and _")
+            self.wrong(f"the parameter {unusable[0]} of {self.name} cannot be a ROS field; use a-z, 0-9, _")
         package, kind, server = written.groups()
         goal = tuple(f"{_ros_type(each.type)} {each.name}" for each in parameters)
         result = None if returns.base is None else _ros_type(returns)
