@@ -59,13 +59,13 @@ def check(
         start: the robot's first room, one of `rooms` if given; by default `start_loc` or else the first room.
         samples: how many worlds to sample, from 1 to 10,000.
         seed: the random seed, which gives the same worlds on all machines.
-        strict: whether to randomize even facts that the program takes for granted.
+        strict: whether to randomize even facts that the program assumes, such as that a person it asks is in.
         skills: the skills that the program may call.
         pool: runs the program on one of its workers; by default the pool of this process.
         room_map: a map that replaces `rooms` and `start` if more is known about the rooms.
         house_rules: the rules that the program must keep in every world.
-        explores: whether to explore all worlds that the program can tell apart, up to a budget, for its
-            contract and for a proof of each rule.
+        explores: whether to find the contract and a proof for each rule, by running the program in all
+            worlds that it can tell apart, within a limit.
         is_wanted: called before each run, from another thread; False ends the check.
 
     Raises:
@@ -99,7 +99,7 @@ def check_on(
     settings: CheckSettings | None = None,
     known: Sequence[Sample] = (),
 ) -> CheckResult:
-    """Check one program on a worker that no other thread uses. `known` are its runs so far, if any."""
+    """Check one program on a worker that no other thread uses, and reuse its earlier runs, `known`."""
     how = settings or CheckSettings()
     room_map = room_map or room_map_for(program, skills=how.skills)
     with worker.one_child():
@@ -133,7 +133,7 @@ def room_map_for(
     *,
     skills: SkillTable = SKILLS,
 ) -> RoomMap:
-    """Return the rooms and the start from the caller, or guess both from the program's source.
+    """Return a map of the given rooms and start, or guess them from the program's source.
 
     Args:
         program: its source.
@@ -167,7 +167,7 @@ def room_map_for(
 
 
 def extend_check(worker: Worker, program: str, found: CheckResult, settings: CheckSettings) -> CheckResult:
-    """Explore the worlds of a program, and add its contract, proofs for rules and new problems to its check.
+    """Return a check with the contract, rule proofs and new problems from exploring the program's worlds.
 
     Args:
         worker: a worker that no other thread uses.
@@ -207,7 +207,7 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
 
 
 def hold_within(found: CheckResult, allowed: Contract, skills: SkillTable) -> CheckResult:
-    """Add a problem to a check for each skill that the program may use beyond the allowed contract."""
+    """Return a check with a new problem for each skill that may be used beyond the allowed contract."""
     if found.contract is None:
         return found
     new = [" ".join(filter(None, row)) for row in contract_rows(found.contract.beyond(allowed), skills)]

@@ -39,7 +39,7 @@ class Exploration:
         most_calls: the highest number of calls of each skill in a run; empty if a run is endless.
         violations: the first world in which a rule is broken, by the name of the rule.
         is_complete: whether the program can do nothing else in other worlds with the same rooms.
-        is_steady: whether this holds even if facts change during a run, or if the robot fails.
+        is_steady: whether the same is true if facts change during a run, or if the robot fails.
     """
 
     cases: int
@@ -69,7 +69,7 @@ class ExploringGuard(RuleGuard):
         self.violations: set[str] = set()  # names of rules
 
     def judge_call(self, row: Skill, arguments: Sequence[Argument], goals: Sequence[str], place: str) -> None:
-        """Record the next call. Raise RobotError if it is the one in which the robot fails."""
+        """Record the next call. Raise RobotError if this is the call in which the robot has to fail."""
         call = RequestedCall.of(row, arguments, goals, place)
         if row.returns.base is not None and row.name not in TELLING_SKILLS:
             self.asks_again |= call in self._asked
@@ -79,7 +79,7 @@ class ExploringGuard(RuleGuard):
             raise RobotError("SkillFailed", f"the robot failed in {row.name}")
 
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
-        """Record the rules that the next event would break. `attempts` are all events that it may be."""
+        """Record the rules that the next event, which is one of `attempts`, would break."""
         self._keep(self.find_violations(attempts, is_drive=is_drive))
 
     def happened(self, event: Event) -> None:
@@ -97,7 +97,7 @@ class ExploringGuard(RuleGuard):
 def explore(worker: Worker, program: str, room_map: RoomMap, settings: CheckSettings) -> Exploration:
     """Run a program in all worlds that it can tell apart, or in as many of them as the budget allows.
 
-    If it takes facts for granted, explore two kinds of worlds: those where these facts hold, as in a check,
+    If the program assumes facts, explore two kinds of worlds: those where these facts hold, as in a check,
     and those where each may be false. If it catches errors, also let the robot fail in one call of a run.
     """
     calls: set[RequestedCall] = set()

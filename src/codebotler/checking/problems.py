@@ -100,7 +100,7 @@ class Sample:
     repeated: Trace = ()  # the steps that a mission which the program continues has done already
 
     def would_repeat_in(self, sampler: FactSampler) -> bool:
-        """Return whether a run in the sampler's world would discover the same facts, and so be identical."""
+        """Whether a run in the sampler's world would discover the same facts, and therefore be identical."""
         return all(draw.holds_in(sampler) for draw in self.draws)
 
     @property
@@ -160,7 +160,7 @@ class CheckResult:
 
     @property
     def evidence(self) -> frozenset[int]:
-        """The numbers of the samples that prove the problems: for each problem, the first one that has it."""
+        """The numbers of the samples that show the problems: for each problem, the first sample with it."""
         ends = {
             sample.outcome.line: sample.number for sample in reversed(self.samples) if sample.outcome.error
         }
@@ -170,7 +170,7 @@ class CheckResult:
         return frozenset(number for number in first if number is not None)
 
     def data(self, skills: SkillTable = SKILLS) -> dict[str, Any]:
-        """Convert the result to plain data for JSON. Equal results give equal data.
+        """Convert the result to a dictionary for JSON. Equal results give equal dictionaries.
 
         Args:
             skills: the skills that the program could call.
@@ -201,7 +201,7 @@ class CheckResult:
 
 
 def no_room(request: str, room_map: RoomMap) -> str:
-    """Say why a request is no room: `there is no room "hal"; the closest is "hall"`, or it means several."""
+    """Return why a request names no single room: `there is no room "hal"; the closest is "hall"`."""
     if len(possible := room_map.possible_rooms(request)) > 1:
         return ambiguous(brief(request), possible)
     name = brief(request)

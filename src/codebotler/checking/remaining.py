@@ -27,7 +27,7 @@ def remaining_outcomes(
     The result is empty if the program always fails, or does not repeat the steps in `room_map.past`.
 
     Args:
-        begun: the program.
+        begun: the source of the interrupted program.
         room_map: the rooms, and in `past` the steps that the robot has done.
         skills: the robot's skills.
         first: the number of steps that the robot had done when the program began.
@@ -51,14 +51,14 @@ def remaining_outcomes(
 
 
 class RepeatingRobot(SampledRobot):
-    """A robot that repeats the recorded results of the past to a program, then acts in a sampled world."""
+    """A robot that first returns the recorded results of earlier steps, then acts in a sampled world."""
 
     def __init__(self, room_map: RoomMap, sampler: FactSampler, how: CheckSettings, first: int) -> None:
         super().__init__(room_map, sampler, how.simulation, how.skills)
         self.left = deque(event for event in room_map.past[first:] if not event.failed)
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Return the recorded result of the next step. Any other call must have failed before."""
+        """Return the recorded result of the next earlier step, or raise RobotError for a different call."""
         if not self.left:
             return super().execute(skill, arguments)
         row, past = self.skills[skill], self.left[0]
@@ -70,7 +70,7 @@ class RepeatingRobot(SampledRobot):
             finally:
                 self.room = here
         if (event.kind, event.text.casefold()) != (past.kind, past.text.casefold()):
-            raise RobotError(SKILL_FAILED, "it failed before")
+            raise RobotError(SKILL_FAILED, "the call failed before")
         self.left.popleft()
         if not event.options:
             return past.found

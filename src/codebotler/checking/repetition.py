@@ -24,7 +24,7 @@ UNBOUNDED_COUNT = 1_000_000
 """Replaces the number of remaining steps of a kind if the program would repeat them without end."""
 
 MAX_COMPARED_PAIRS = 20_000
-"""The limit for pairs of a step of the program and an earlier or remaining step. More give `LongPast`."""
+"""How many pairs of steps, one of the program and one of the mission, are compared; more give `LongPast`."""
 
 EMPTY_WORDS = frozenset(
     {
@@ -40,19 +40,19 @@ _PUNCTUATION = re.compile(r"[^\w\s]+")
 
 
 def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = ()) -> CheckResult:
-    """Add problems to a check: steps that the robot has done already, and a thing that it never puts down.
+    """Return a check with further problems: steps that were done already, and a thing that is not put down.
 
-    The program may wait without end if the begun one does, since what both wait for may still come.
+    The program may wait without end if the first program does, since what both wait for may still come.
 
     Args:
-        found: the check of a program for the rest of a mission; its map contains what was done.
-        begun: the program that the mission began with.
-        remaining: what the begun program would still do, in several worlds; empty if that is unknown.
+        found: the check of a program for the rest of a mission; `room_map.past` has the steps done so far.
+        begun: the first program of the mission.
+        remaining: what the first program would still do, in several worlds; empty if that is unknown.
     """
     past, problems, samples = found.room_map.past, list(found.problems), []
     others = len(_distinct(past)) + len(_distinct(event for one in remaining for event in one.trace))
     if others * max((len(one.outcome.trace) for one in found.samples), default=0) > MAX_COMPARED_PAIRS:
-        message = "too many steps were done before to compare this program with them"
+        message = "the mission has too many earlier steps; this program cannot be compared with them"
         return replace(found, problems=(*problems, Problem("LongPast", message)))
     if remaining and all(one.status is Status.TIMEOUT for one in remaining):
         problems = [problem for problem in problems if problem.kind != "TimeoutError"]
@@ -81,7 +81,7 @@ def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = 
 def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome] = ()) -> Iterator[Event]:
     """Yield the steps of a trace that the robot has done already, such as the same question in the same room.
 
-    If a room gets more steps of a kind than remained to be done, a past step in other words counts as well.
+    If the trace has more steps of a kind in a room than `remaining`, steps in other words count as well.
     """
     done = _distinct(event for event in room_map.past if not event.failed)
     later = _distinct(event for one in remaining for event in one.trace)
@@ -132,7 +132,7 @@ def _sort(event: Event, room_map: RoomMap) -> tuple[str, str]:
 
 
 def has_same_effect(one: Event, other: Event, room_map: RoomMap) -> bool:
-    """Return whether two steps say, ask or do the same in the same room. A thing may be picked up again."""
+    """Whether two steps say, ask or do the same in the same room; False for a kind that may be repeated."""
     if one.kind != other.kind or one.kind == PICK or not _has_effect(one.kind):
         return False
     if _room(one, room_map) != _room(other, room_map) or normalized(one.to or "") != normalized(
@@ -144,7 +144,7 @@ def has_same_effect(one: Event, other: Event, room_map: RoomMap) -> bool:
 
 
 def is_about_same(one: Event, other: Event) -> bool:
-    """Return whether two steps of a kind have the same topic, as do "Is it ready?" and "Ready yet?"."""
+    """Whether two steps of the same kind have the same topic, such as "Is it ready?" and "Ready yet?"."""
     if not is_spoken(one.kind):
         return _words(one.text) == _words(other.text)
     if not one.options and polarity(one.text) is not polarity(other.text):

@@ -33,7 +33,7 @@ WORLDS_AT_ONCE = 16
 class CheckSettings:
     """Settings of a check."""
 
-    samples: int = DEFAULT_SAMPLES
+    samples: int = DEFAULT_SAMPLES  # how many random worlds come first
     seed: int = 0  # gives the same worlds on all machines
     strict: bool = False  # whether to randomize even facts that the program takes for granted
     simulation: SimulationSettings = AS_WRITTEN
@@ -47,7 +47,7 @@ class CheckSettings:
 
 
 class UnwantedCheckError(Exception):
-    """Raised before the next run of a check that is no longer wanted."""
+    """Raised before the next run of a check if `is_wanted` of its settings returns False."""
 
 
 class SampledRuns:
@@ -62,7 +62,7 @@ class SampledRuns:
         self.job: Job = program, [partial(self._new_robot, number) for number in range(len(samplers))]
 
     def samples_on(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
-        """Return a sample for each world. Reuse `known` outcomes, and skip worlds that would repeat a run."""
+        """Return a sample for each world that repeats no run. `known` maps a world's index to its outcome."""
         ran: list[Sample] = []
         for number, sampler in enumerate(self.samplers):
             if number in known:
@@ -77,7 +77,7 @@ class SampledRuns:
         return ran
 
     def new_guard(self) -> RuleGuard | None:
-        """Return a guard that holds one run to the house rules, or None if there are no rules."""
+        """Return a guard that enforces the house rules in one run, or None if there are no rules."""
         rules = self.settings.house_rules
         return RuleGuard(rules, self.room_map) if rules else None
 
@@ -91,7 +91,7 @@ class SampledRuns:
 
 
 def run_together(worker: Worker, runs: Sequence[SampledRuns]) -> list[list[Sample]]:
-    """Run several programs, and return the samples of each. Tame programs share a process."""
+    """Run several programs, and return the samples of each. Simple programs share a process."""
     known: list[dict[int, Outcome]] = [{} for _ in runs]
     for (number, run), outcome in worker.run_tame([one.job for one in runs]).items():
         known[number][run] = outcome

@@ -20,7 +20,7 @@ STEP_MARK = "❱"
 
 
 def steps_of(trace: Trace, *, has_places: bool = False) -> list[dict[str, Any]]:
-    """Convert the events of a trace to plain data, numbered from 1, with places if `has_places` is set."""
+    """Convert the events of a trace to dictionaries, numbered from 1 and, if `has_places`, with rooms."""
     return [_step_data(number, event, has_places=has_places) for number, event in enumerate(trace, 1)]
 
 
@@ -41,14 +41,14 @@ def _step_data(number: int, event: Event, *, has_places: bool) -> dict[str, Any]
 
 
 def event_from_step(step: Mapping[str, Any]) -> Event:
-    """Convert a step from `steps_of` back to an event. Its place is left out."""
+    """Convert a step from `steps_of` back to an event, which has no place."""
     options = tuple(map(option_from, step.get("options", ())))
     more = tuple(step.get("more", ()))
     return Event(step["kind"], step["text"], options, step.get("answer"), step.get("found"), more=more)
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
-    """Draw the steps room by room. The steps in `needed` are marked and always shown."""
+    """Return a table of steps, room by room. The steps whose numbers are in `needed` are marked and shown."""
     table = grid("right", "left")
     if not steps:
         table.add_row(Text(), Text("the robot did nothing", "dim"))
@@ -70,7 +70,7 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 def select_steps(
     steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 ) -> Iterator[tuple[bool, Sequence[Mapping[str, Any]]]]:
-    """Split steps into runs to show or to hide. Of a long trace, show both ends and the needed steps."""
+    """Group consecutive steps by whether to show them: of a long trace, both ends and those in `needed`."""
 
     def is_shown(step: Mapping[str, Any]) -> bool:
         number = step["step"]

@@ -54,7 +54,7 @@ BadInput = UserError  # the former name, for one version
 
 
 def expect_list(given: Sequence[str] | None, what: str) -> None:
-    """Raise UserError for `rooms="lobby"` instead of `rooms=["lobby"]`; `what` names the argument."""
+    """Raise UserError if a list is a single string, as in `rooms="lobby"`; `what` names the argument."""
     if isinstance(given, str):
         raise UserError(f"{what} must be a list, not the single string {given[:40]!r}")
 
@@ -66,7 +66,7 @@ def install_command(package: str) -> str:
 
 @contextmanager
 def installed() -> Iterator[None]:
-    """Guard imports of optional packages: raise UserError with the install command if one is missing."""
+    """In a `with` block, turn a missing optional package into a UserError with the command to install it."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -84,8 +84,8 @@ class RobotError(Exception):
     """Raised when the robot cannot execute a skill.
 
     Args:
-        kind: RuleViolation, AskInvalidOptions, or one of the kinds of robot errors in section V.B of the
-            paper.
+        kind: such as `GoToInvalidLocation` (section V.B of the paper), `RuleViolation`, or a kind that a
+            custom skill declares.
         message: the reason, in a sentence.
     """
 

@@ -27,32 +27,32 @@ MAX_ROW = 5_000_000
 
 
 def read_text(path: Path, *, limit: int = MAX_FILE_BYTES) -> str:
-    """Read a UTF-8 file of at most `limit` bytes, or raise UserError."""
+    """Read a UTF-8 file. Raise UserError if it is not readable, not UTF-8, or longer than `limit` bytes."""
     return decode_text(read_bytes(path, limit + 1), path, limit=limit)
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """Read at most `most` bytes from the start of a file, or raise UserError."""
+    """Read at most `most` bytes from the start of a file, or raise UserError if it cannot be read."""
     with _open(path) as file:
         return file.read(most)
 
 
 def decode_text(data: bytes, name: Path | str, *, limit: int = MAX_FILE_BYTES) -> str:
-    """Decode UTF-8, normalize line endings and drop a byte order mark. UserErrors name the file `name`."""
+    """Decode UTF-8, normalize line endings and drop a byte order mark. Errors name the file `name`."""
     if len(data) > limit:
-        raise UserError(f"is larger than {limit:,} bytes", file=name)
+        raise UserError(f"the text is larger than {limit:,} bytes", file=name)
     _expect_not_utf_16(data, name)
     try:
         return io.StringIO(data.decode("utf-8-sig"), newline=None).read()
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise UserError("is not UTF-8 text; save it as UTF-8", file=name, line=line) from None
+        raise UserError("the text is not UTF-8; save it as UTF-8", file=name, line=line) from None
 
 
 def _expect_not_utf_16(data: bytes, name: Path | str) -> None:
     """Reject text with the byte order mark of UTF-16, which editors on Windows call Unicode."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        raise UserError("is UTF-16 text; save it as UTF-8", file=name)
+        raise UserError("the text is UTF-16; save it as UTF-8", file=name)
 
 
 @contextmanager
@@ -61,14 +61,14 @@ def _open(path: Path) -> Iterator[BinaryIO]:
         with path.open("rb") as file:
             yield file
     except OSError as error:
-        raise UserError(f"cannot be read ({error.strerror})", file=path) from None
+        raise UserError(f"the file cannot be read ({error.strerror})", file=path) from None
 
 
 # --- JSON lines
 
 
 def read_lines(path: Path, *, limit: int = MAX_ROW) -> Iterator[tuple[int, bytes]]:
-    """Yield the lines of a file, numbered from 1, or raise UserError if a line is longer than the limit."""
+    """Yield the lines of a file, numbered from 1. Raise UserError if a line is longer than `limit` bytes."""
     with _open(path) as file:
         for number in count(1):
             line = file.readline(limit + 1)
@@ -82,7 +82,7 @@ def read_lines(path: Path, *, limit: int = MAX_ROW) -> Iterator[tuple[int, bytes
 
 
 def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the numbered rows of a JSON Lines file, but not a partial last line if the file is growing."""
+    """Yield the line number and data of each row of a JSON Lines file; if `growing`, skip a partial row."""
     for number, line in read_lines(path):
         if line.strip():
             try:
@@ -92,7 +92,7 @@ def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[
             if row is None and growing and not line.endswith(b"\n"):
                 return
             if row is None:
-                raise UserError("this line is not JSON", file=path, line=number)
+                raise UserError("this line is not JSON; correct or remove it", file=path, line=number)
             yield number, row
 
 
@@ -181,7 +181,7 @@ def _intact_length(path: Path) -> int:
 
 @contextmanager
 def name_in_errors(path: Path) -> Iterator[None]:
-    """Add a file's name to system errors, which often lack it."""
+    """In a `with` block, add a file's name to each OSError, which often lacks it."""
     try:
         yield
     except OSError as error:
@@ -198,7 +198,7 @@ def write_whole(path: Path, content: bytes | memoryview) -> None:
 
 @contextmanager
 def open_replacement(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
-    """Open a temporary file that atomically replaces `path` when it is complete, but not after an error."""
+    """Open a temporary file that atomically replaces `path` if the `with` block ends without an error."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = temporary or path.with_name(path.name + ".new")
     try:
@@ -234,7 +234,7 @@ def expect_replaceable(path: Path, *beginnings: bytes) -> None:
         with path.open("rb") as file:
             start = file.read(max(map(len, beginnings)))
         if start and not start.startswith(beginnings):
-            raise UserError("this file has unexpected content; remove it or choose another file", file=path)
+            raise UserError("this file has unexpected content; remove it or write to another file", file=path)
 
 
 # --- the state folder
@@ -269,4 +269,4 @@ def make_folder(folder: Path) -> None:
     with suppress(PermissionError):
         folder.mkdir(parents=True, exist_ok=True)
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=True):
-        raise UserError("cannot be written to; name another folder with CODEBOTLER_HOME", file=folder)
+        raise UserError("this folder is not writable; set CODEBOTLER_HOME to another", file=folder)

@@ -138,7 +138,7 @@ def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, booleans, 
             return ast.literal_eval(node)
     except (TypeError, SyntaxError, MemoryError, RecursionError) as error:
         raise ValueError(str(error)) from None
-    raise ValueError("it is a dictionary or a set")
+    raise ValueError("a dictionary or a set is not allowed")
 
 
 def parse_leniently(source: str) -> ast.Module:
@@ -197,7 +197,7 @@ def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[s
 
 
 def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, int]:
-    """Map each skill that a program uses to the line of its first use, except skills that it redefines."""
+    """Return the line of the first use of each skill in a program, by its name. Omit redefined skills."""
     rebound = all_bound_names(tree)
     lines: dict[str, int] = {}
     for node in nodes(tree):
@@ -230,7 +230,7 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
 
 
 def find_tree_flaws(tree: ast.Module, source: str, skills: SkillTable) -> tuple[Flaw, ...]:
-    """Find mistakes in a program that compiles, such as misspelt skills, and sort them by line."""
+    """Return the mistakes in a program that compiles, such as misspelt skills, sorted by line."""
     try:
         found = [*_entry_flaws(tree, source), *_name_flaws(tree, skills), *_call_flaws(tree, skills)]
     except (RecursionError, MemoryError) as error:

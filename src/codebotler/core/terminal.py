@@ -26,7 +26,7 @@ MAX_PIPE_WIDTH = 10_000
 
 @contextmanager
 def report_problems() -> Iterator[None]:
-    """Print logs, warnings and tracebacks to stderr; exit with status 1 after an unexpected error."""
+    """In a `with` block, print logs and warnings to stderr, and exit with status 1 on an unexpected error."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # for terminals without Unicode
     before = logging.lastResort, warnings.showwarning, threading.excepthook
@@ -56,7 +56,7 @@ def _note_error(error: BaseException | None) -> None:
 
 
 def open_streams() -> None:
-    """Open closed standard streams on /dev/null, so that our own files do not get their descriptors."""
+    """Open each standard stream that is closed as /dev/null, so that no other file gets its descriptor."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
@@ -73,7 +73,7 @@ def drop_output() -> None:
 
 
 def console(*, stderr: bool = False, highlight: bool = True) -> Console:
-    """Return a rich console that escapes control characters in texts."""
+    """Return a rich console that escapes control characters. `highlight` colours numbers and strings."""
     from rich.console import Console, ConsoleOptions
     from rich.segment import Segment
 
@@ -89,7 +89,7 @@ def console(*, stderr: bool = False, highlight: bool = True) -> Console:
 
 
 def progress(*columns: ProgressColumn) -> Progress:
-    """Return a progress bar on stderr, which is disabled if stderr is not a terminal."""
+    """Return a progress bar with these columns on stderr. It shows nothing if stderr is not a terminal."""
     from rich.progress import Progress
 
     where = console(stderr=True)
@@ -97,7 +97,7 @@ def progress(*columns: ProgressColumn) -> Progress:
 
 
 def print_rich(what: RenderableType) -> None:
-    """Print a rich table or text. A pipe gets plain text, and lines wrap there only if COLUMNS is set."""
+    """Print a rich table or text. A pipe or file gets plain text, whose lines wrap only if COLUMNS is set."""
     from rich.measure import Measurement
 
     drawing = console()
@@ -114,7 +114,7 @@ def print_rich(what: RenderableType) -> None:
 
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
-    """Show a spinner with the elapsed time and the text `doing`, such as `asking the model`."""
+    """Show a spinner, the elapsed time and a text such as `asking the model` until the `with` block ends."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     with progress(SpinnerColumn(), TextColumn(doing, markup=False), TimeElapsedColumn()) as shown:
@@ -123,7 +123,7 @@ def busy(doing: str) -> Iterator[None]:
 
 
 def print_found(view: Callable[[], RenderableType], data: Callable[[], object], *, as_json: bool) -> None:
-    """Print the result of `view` for a person or, if `as_json`, the result of `data` as JSON."""
+    """Print the result of `view()` for a person or, if `as_json`, the result of `data()` as JSON."""
     if as_json:
         print_json(data())
     else:
@@ -138,7 +138,7 @@ def print_json(data: object) -> None:
 
 
 def print_source(text: str) -> None:
-    """Print a program, escaped on a terminal and unchanged to a file or a pipe."""
+    """Print a program to stdout: with control characters escaped on a terminal, else unchanged."""
     if sys.stdout.isatty():
         text = visible_lines(text)
     print(text, end="" if text.endswith("\n") else "\n")
@@ -155,12 +155,12 @@ def note(sentence: str) -> None:
 
 
 def confirm(question: str) -> bool:
-    """Ask a question on stderr, and return True only if the answer is yes."""
+    """Ask a question on stderr, and return True only if the person types `y` or `yes`."""
     return read_line(f"{question} [y/N] ").strip().lower() in {"y", "yes"}
 
 
 def read_line(question: str) -> str:
-    """Ask a question on stderr, and return the line that a person types, or `""` at the end of the input.
+    """Ask a question on stderr, and return the typed line with its line break, or `""` at the end of input.
 
     On a terminal, text that was typed before the question appeared is discarded.
     """
@@ -176,21 +176,21 @@ def is_interactive() -> bool:
 
 
 def system_sentence(error: OSError) -> str:
-    """Describe a system error in a sentence that names the file and, for a full disk, the fix."""
+    """Return a sentence about a system error that names the file and, for a full disk, the fix."""
     where = "the output" if error.filename is None else visible(os.fsdecode(error.filename))
     mend = "; free some disk space and try again" if error.errno in DISK_FULL else ""
     return f"{where}: {error.strerror}{mend}"
 
 
 def visible(text: str) -> str:
-    """Escape unprintable characters, such as ESC."""
+    """Return a text with its unprintable characters escaped, such as ESC and line breaks."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def visible_lines(text: str) -> str:
-    """Escape unprintable characters in each line, and expand tabs."""
+    """Return a text with its unprintable characters escaped, but keep line breaks and expand tabs."""
     if text.isprintable():
         return text
     return "\n".join(visible(line.expandtabs(4)) for line in re.split("\r\n?|\n", text))

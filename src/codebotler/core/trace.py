@@ -27,7 +27,7 @@ class Option(NamedTuple):
 
 
 def to_options(values: Iterable[object]) -> tuple[Option, ...]:
-    """Convert the options of a question to `Option` values, unless they already are."""
+    """Convert the options of a question to `Option` values; those that are `Option` already stay so."""
     return tuple(
         [one if isinstance(one, Option) else Option(str(one), isinstance(one, str)) for one in values]
     )
@@ -39,17 +39,17 @@ class Event:
 
     Args:
         kind: goto, say, ask, check, pick or place, or the kind that a custom skill records.
-        text: the program's request, stripped.
+        text: what the program asks for, such as `kitchen`, without outer spaces.
         options: the options of a question; empty for other kinds.
         answer: the text of the chosen option; None for an unanswered question and for other kinds.
         found: the result of a look or another yes-or-no skill; None for other kinds.
         place: the name, in the world, of the room where it happened (for a drive, where it started).
-        time: simulated seconds since the start of the run.
+        time: seconds since the start of the run, on the simulated clock or the clock of a real robot.
         holding: what the robot held when it began; empty for nothing.
         to: the addressee of a question; None for other kinds.
         more: further arguments, as texts.
         destination: the room where a drive ended; None for a failed drive and for other kinds.
-        failed: the kind of the error by which it failed; such events occur only in the past of a mission.
+        failed: the kind of the error by which it failed, if this is recorded, else empty.
     """
 
     kind: str
@@ -174,7 +174,7 @@ def placed_trace_from(data: Iterable[Mapping[str, Any]]) -> Trace:
 
 
 def outcome_data(outcome: Outcome, skills: SkillTable = SKILLS) -> dict[str, Any]:
-    """Convert an outcome to `status`, `error` (`kind` and `message`, or None), `line` and `trace`."""
+    """Convert an outcome to data: `status`, `error` (`kind` and `message`, or None), `line` and `trace`."""
     error = None if outcome.error is None else {"kind": outcome.error.kind, "message": outcome.error.message}
     return {
         "status": outcome.status.value,
@@ -212,7 +212,7 @@ def _event_from(element: object) -> Event:
 
 
 def option_data(option: Option) -> object:
-    """Convert an option to its text, or to a mapping if the program offered another type."""
+    """Convert an option to its text or, if it was not a string, to a mapping such as `{"no text": "5"}`."""
     return option.text if option.is_text else {"no text": option.text}
 
 

@@ -42,7 +42,7 @@ class Room:
     """A room that the robot can drive to.
 
     Args:
-        name: a regex that is searched for in a program's request.
+        name: the name, or a regex that is searched for in a program's requests.
         objects: the labels of its objects, in order.
         people: the people in it, in order.
         footprint: the positions of its corners in metres; None if unknown.
@@ -74,9 +74,9 @@ class World:
         rooms: the rooms, at least one, with unique names, in the order in which the robot lists them.
         robot: the room where the robot starts.
         about: a short description.
-        may_wait_forever: whether a program may wait in it for something that never happens.
-        truths: statements with their values, such as `read_gauge("boiler")` with 3.
-        traits: the properties of things and people, by their labels and names.
+        may_wait_forever: whether a program may wait in this world for something that never happens.
+        truths: pairs of a statement and its value, such as `read_gauge("boiler")` and 3.
+        traits: for things and people with properties, pairs of the name and its properties.
     """
 
     rooms: tuple[Room, ...]
@@ -134,7 +134,7 @@ def _squared(room: Room) -> Room:
 
 
 def laid_out(world: World) -> World:
-    """Give every room a footprint and a standing point, in a grid on both sides of a hallway.
+    """Return a world in which every room has a footprint and a standing point, on both sides of a hallway.
 
     Existing footprints are kept. A room with only a standing point gets a square metre around that point.
     All other rooms are placed to the right.
@@ -189,7 +189,7 @@ def is_within(point: Point, corners: Sequence[Point]) -> bool:
 
 
 def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
-    """Cut a straight path wherever it enters or leaves a room, and yield the names of each part's rooms."""
+    """Cut a straight path where it enters or leaves a room, and yield the names of the rooms of each part."""
     here, way = complex(*start), complex(*end) - complex(*start) or MIN_PART
     edges = {}  # for each room, the fractions of the path at which the path crosses its edges
     for room in rooms:
@@ -203,7 +203,7 @@ def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tup
 
 
 def crossings(y: float, corners: Sequence[Point]) -> list[float]:
-    """Return the x coordinates at which the edges of a polygon cross a horizontal line, in order."""
+    """Return the x coordinates, sorted, at which the edges of a polygon cross the horizontal line at `y`."""
     edges = zip(corners, [*corners[1:], *corners[:1]], strict=True)
     return sorted(
         a + (y - low) / (high - low) * (b - a) for (a, low), (b, high) in edges if (low > y) != (high > y)

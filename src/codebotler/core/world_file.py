@@ -165,7 +165,7 @@ class WorldFile(_Form):
             yield asked, tuple(value) if isinstance(value, list) else value
 
     def world(self, file: YamlFile, at: YamlPath = (), skills: SkillTable | None = None) -> World:
-        """Convert the file to a World, or raise UserError if a room, a trait or a truth is wrong."""
+        """Convert the content, which is at `at` in the file, to a World. Raise UserError for a mistake."""
         names: dict[str, str] = {}  # by lower-case name
         for where, room, _ in self._goals():
             if other := names.get(room.name.lower()):
@@ -232,7 +232,7 @@ def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
     """Return a statement in the form that skills use, or raise ValueError if its value is impossible."""
     if not _CALL.fullmatch(statement):
         if isinstance(value, list):
-            raise ValueError(f'"{statement}" is a list; write a single value')
+            raise ValueError(f'the value of "{statement}" is a list; write a single value')
         return statement
     name, given = _parse_call(statement)
     if not name:
@@ -257,7 +257,7 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
     """Raise ValueError if a call cannot return this value, or if the skill's code computes its result."""
     row = skills.get(name)
     if row is None or not row.is_random:
-        raise ValueError(f"{name} is not a skill with an empty body; instead, set the facts it depends on")
+        raise ValueError(f"{name} is not a skill with an empty body; set what its result depends on")
     if len(given) != len(row.parameters) or not all(
         parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)
     ):

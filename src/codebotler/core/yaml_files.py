@@ -46,7 +46,7 @@ class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chose
     def descend_resolver(self, parent: yaml.Node | None, index: object) -> None:
         self.depth += 1
         if self.depth > MAX_DEPTH:
-            raise _fault(f"this is nested more than {MAX_DEPTH} levels deep", parent)
+            raise _fault(f"the text is nested more than {MAX_DEPTH} levels deep", parent)
         super().descend_resolver(parent, index)
 
     def ascend_resolver(self) -> None:
@@ -74,7 +74,7 @@ def _quoted(value: object) -> str:
 
 
 class YamlFile:
-    """A parsed YAML file that knows the line of each part. Invalid YAML raises UserError."""
+    """A parsed YAML file that knows the line of each part. Invalid YAML raises a UserError about `name`."""
 
     def __init__(self, text: str, name: Path | str) -> None:
         self.name = name
@@ -91,11 +91,11 @@ class YamlFile:
 
     @classmethod
     def read(cls, path: Path) -> YamlFile:
-        """Read and parse a file, or raise UserError."""
+        """Read and parse a file, or raise UserError if it cannot be read or is not valid YAML."""
         return cls(read_text(path), path)
 
     def line(self, place: Sequence[str | int]) -> int | None:
-        """Return the line of a part of the file, or of the nearest part that contains it."""
+        """Return the line, from 1, of a part or of the nearest part around it; None if the file is empty."""
         path = tuple(place)
         while path not in self._lines:
             if not path:
@@ -117,13 +117,13 @@ class YamlFile:
         return found
 
     def wrong(self, sentence: str, *place: str | int) -> UserError:
-        """Return a UserError about a part of this file, with its line."""
+        """Return (not raise) a UserError about the part of this file at `place`, with its line."""
         return UserError(sentence, file=self.name, line=self.line(place))
 
     def validate(self, model: type[FileModel], data: object = None, *, at: YamlPath = ()) -> FileModel:
         """Convert the content to a pydantic model, or raise UserError with the line of a mistake.
 
-        With `data`, convert this instead: the value of the part at `at`.
+        If `data` is given, convert it instead; it is the value of the part at `at`.
         """
         try:
             return model.model_validate(self.data if data is None and not at else data)
@@ -154,7 +154,7 @@ class YamlFile:
     def _remember(self, node: yaml.Node, place: YamlPath) -> None:
         self._lines[place] = node.start_mark.line + 1
         if len(place) > MAX_DEPTH or len(self._lines) > MAX_PLACES:
-            raise _fault("this is nested too deeply, or its anchors repeat too much", node)
+            raise _fault("the text is nested too deeply, or its anchors repeat too much", node)
         if isinstance(node, yaml.SequenceNode):
             for index, item in enumerate(node.value):
                 self._remember(item, (*place, index))

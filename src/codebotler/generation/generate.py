@@ -26,7 +26,7 @@ from codebotler.simulator.worlds.room_map import RoomMap
 CONCURRENT_REQUESTS = 4  # for candidates
 
 Checker: TypeAlias = Callable[[str], Sequence[str]]
-"""Returns the problems of a program, one sentence each; none if the program is accepted."""
+"""A function that returns the problems of a program, one sentence each; none if it accepts the program."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ async def write_program(
     """Ask a model for a program until `find_problems` accepts one (rejection sampling; paper, section V).
 
     Ask again at most `retries` times. With `repair`, a further request includes the rejected program and its
-    problems, or the reason why the reply has no program. The model is closed at the end.
+    problems, or says why the last reply has no program. Close the model at the end.
     """
     attempts: list[Attempt] = []
     limited, request = RateLimited(model, concurrency=1), prompt
@@ -107,7 +107,7 @@ async def make_attempt(
     settings: SamplingSettings,
     find_problems: Checker | None = None,
 ) -> Attempt:
-    """Check the program in a reply. A reply without a program has this as its only problem."""
+    """Check the program in a reply, and return the attempt. A missing program is its only problem."""
     if (none := describe_programless(reply, settings)) is not None:
         return Attempt(number, prompt, reply, (none.sentence,), none)
     found = () if find_problems is None else await asyncio.to_thread(find_problems, reply.program)
@@ -149,7 +149,7 @@ def write_checked_program(
     repair: bool = False,
     on_attempt: Callable[[Attempt], None] = ignore_attempt,
 ) -> Generation:
-    """Ask a model until a program passes the check in sampled worlds. This works in notebooks, too."""
+    """Ask a model, at most `retries` + 1 times, until a program passes the check in sampled worlds."""
     with WorkerPool(1) as pool:
 
         def find_problems(program: str) -> list[str]:

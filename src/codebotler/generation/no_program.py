@@ -25,7 +25,7 @@ class ProgramlessReply:
 
     @property
     def can_repair(self) -> bool:
-        """Whether asking again with the sentence may help, which it cannot after a content filter."""
+        """Whether the model may do better if it is told the reason; False after a content filter."""
         return self.kind != "filtered"
 
 

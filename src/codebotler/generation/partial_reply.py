@@ -25,7 +25,7 @@ class PartialReply:
 
 
 def split_partial(reply: str) -> PartialReply:
-    """Split the start of a reply into text and code, where reasoning between tags counts as text."""
+    """Split the start of a reply into text and code. Reasoning between tags counts as text."""
     thought = max((tag.end() for tag in REASONING_END.finditer(reply)), default=0)
     reasoning, answer = reply[:thought], reply[thought:]
     if REASONING_START.match(answer):

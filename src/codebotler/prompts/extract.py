@@ -77,7 +77,7 @@ def program_of(reply: str, *, continues: bool = False) -> Program:
 
 
 def program_in(text: str) -> str:
-    """Return a string unchanged if it defines `task_program`, else the program in it; see `program_of`."""
+    """Return a text unchanged if it defines `task_program`, else the program that `program_of` finds."""
     try:
         return text if defines_task(text) else program_of(text).source
     except IsolatedCallError:
@@ -94,7 +94,7 @@ def defines_task(text: str) -> bool:
     "Here it is:\n```python\ndef task_program():\n    greet()\n```\n```\ndef greet():\n    say('hello')\n```"
 )
 def extract(reply: str, *, continues: bool = False) -> tuple[str, str, bool]:
-    """Return the program and the reasoning in a reply, and whether it has any code."""
+    """Return the program and the reasoning in a reply, and whether the reply has any code."""
     lines = re.split(r"\r\n|\r|\n", reply.removeprefix("\ufeff"))
     if _is_program(lines, continues=continues):
         return _join([lines]), "", True

@@ -39,7 +39,7 @@ INTERJECTION = re.compile(r" ?[A-Z][a-z]+\s*$")
 
 
 def is_prose(line: str) -> bool:
-    """Whether a line is certainly prose. A doubtful line counts as code, so that no code is lost."""
+    """Whether a line is certainly not code. A doubtful line counts as code, so that no code is lost."""
     line = without_residue(line)
     if INTERJECTION.match(line) or (line.strip() and is_residue(line)):
         return True
@@ -62,18 +62,18 @@ def _has_words(line: str) -> bool:
 
 
 def is_residue(line: str) -> bool:
-    """Whether a line is blank or a chat template token."""
+    """Whether a line is blank or consists of chat template tokens, such as `<|assistant|>`."""
     return bool(RESIDUE_LINE.fullmatch(line.strip()))
 
 
 def trim(lines: Sequence[str]) -> Sequence[str]:
-    """Drop blank lines and chat template tokens at the start and the end."""
+    """Return the lines without those at both ends that are blank or only chat template tokens."""
     kept = [i for i, line in enumerate(lines) if not is_residue(line)]
     return lines[kept[0] : kept[-1] + 1] if kept else []
 
 
 def without_residue(line: str) -> str:
-    """Drop chat template tokens at both ends of a line, and a fence at its end."""
+    """Return a line without chat template tokens at both ends, and without a fence at its end."""
     while (shorter := RESIDUE.sub("", line)) != line:
         line = shorter
     return line

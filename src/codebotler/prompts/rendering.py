@@ -66,11 +66,11 @@ class Prompt:
     last_step: str = ""  # of the mission whose rest is requested, in words; empty for a new mission
 
     def after(self, program: str, problems: Sequence[str]) -> Prompt:
-        """Return a request to rewrite a program without these problems, each given in a sentence."""
+        """Return this request, followed by a program and by its problems, which the model is asked to fix."""
         return self._followed("repair", program, problems=list_lines(problems))
 
     def to_continue(self, program: str, steps: Sequence[str], why: str, here: str, last_step: str) -> Prompt:
-        """Return a request to write the rest of a mission that ended early.
+        """Return this request, followed by one to write the rest of a mission that ended early.
 
         Args:
             program: the program that the robot ran.
@@ -92,7 +92,7 @@ class Prompt:
         return replace(self, messages=(*self.messages, answer, request), text=text)
 
     def after_no_program(self, why: str) -> Prompt:
-        """Return this request with the reason why the last reply had no program. Only chat models see it."""
+        """Return this request with the reason why the last reply had no program, for chat models only."""
         *before, request = self.messages
         asked = f"{request.text}\n\n{fill_template('no-program', why=why)}"
         return replace(self, messages=(*before, replace(request, text=asked)))
@@ -105,7 +105,7 @@ class Prompt:
 
 
 def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
-    """Return the index in a base model's reply at which the function begun by `opening` ends.
+    """Return the index in a base model's reply where the function ends that begins with `opening`.
 
     It ends before the first line without indentation outside brackets and strings, or before a `stop` text.
     """
@@ -120,7 +120,7 @@ def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
 
 
 def clean_instruction(instruction: str) -> str:
-    """Strip and normalize an instruction, or raise UserError if it is empty."""
+    """Return an instruction without outer spaces and in Unicode form NFC. Raise UserError if it is empty."""
     if not (instruction := compose(instruction.strip())):
         raise UserError("the instruction is empty; say what the robot should do")
     return instruction
@@ -133,7 +133,7 @@ def prompt_for(
     rules: Sequence[str] = (),
     skills: SkillTable = SKILLS,
 ) -> Prompt:
-    """Return the prompt for an instruction.
+    """Return the prompt that asks a model for a program which carries out an instruction.
 
     Args:
         instruction: the robot's task, in plain words.

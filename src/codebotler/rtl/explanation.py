@@ -28,7 +28,7 @@ class Explanation:
     """The reason why a formula fails.
 
     Args:
-        event: the position of the event that makes it fail; None if an event is missing.
+        event: the position, from 0, of the event that makes it fail; None if an event is missing.
         sentence: the reason in words, with steps counted from 1.
     """
 

@@ -91,7 +91,7 @@ class EventPattern:
         holding: matches what the robot held at the start of the event; None for anything.
         to: matches the addressee of a question; None for anyone.
         more: match further arguments, in order.
-        has_text: whether events of this kind have a string; False if their skill has no parameters.
+        has_text: whether events of this kind have a text; False if their skill has no parameters.
         means: words that explain its texts, such as `that nobody is coming`; None to show the texts.
     """
 
@@ -110,12 +110,12 @@ class EventPattern:
 
     @cached_property
     def place_regex(self) -> re.Pattern[str] | None:
-        """The compiled regex for the room."""
+        """The compiled regex for the room's name, or None if the pattern matches in any room."""
         return None if self.place is None else whole_word(self.place)
 
     @cached_property
     def is_about_more(self) -> bool:
-        """Whether it has conditions on the answer, result, held object, addressee or further arguments."""
+        """Whether the pattern looks at the answer, result, held object, addressee or further arguments."""
         wanted = self.answer, self.found, self.holding, self.to
         return bool(self.more) or any(one is not None for one in wanted)
 
@@ -211,7 +211,7 @@ class ActAtFirst(_ActAtPlace):
 
     @cached_property
     def stay(self) -> tuple[Scope, ...]:
-        """The scopes that contain the first stay only."""
+        """The scopes of this test, and two more that limit it to the first stay."""
         bounds = Scope("OnlyAfterFirst", self.arrival), Scope("BeforeFirst", self.departure)
         return (*self.scopes, *bounds)
 

@@ -35,7 +35,7 @@ class Monitor:
 
     @property
     def is_final(self) -> bool | None:
-        """Whether no further event can change `holds`; None without `events`, or if it takes too long."""
+        """Whether no further event can change `holds`; None without `events`, or if this is too complex."""
         if self._masks is None:
             return None
         possible, waiting = {self._state}, [self._state]

@@ -37,12 +37,12 @@ def choices(pattern: str) -> tuple[str, ...] | None:
 
 
 def one_of(texts: tuple[str, ...]) -> str:
-    """Join alternatives, such as `"bread" or "toast"`. After the fifth, give only the number of the rest."""
+    """Join alternatives: `"bread" or "toast"`. Of more than five texts, count those after the fifth."""
     return listed(elide_list([f'"{brief(text)}"' for text in texts]), "or")
 
 
 def first_choice(pattern: str) -> str:
-    """Return the first plain text that a regex finds, or `(…)` if it cannot be determined."""
+    """Return the first text that a regex finds, `anything` for `.*`, or `(…)` if it cannot be determined."""
     first = "anything" if pattern in MATCH_ALL_PATTERNS else (choices(pattern) or (UNCLEAR,))[0]
     return pattern if first == pattern.strip() or not pattern else first
 

@@ -16,8 +16,8 @@ class Inconclusive(Exception):  # noqa: N818 - a third verdict, not a mistake of
     """Raised if a formula depends on an option of a question that is not a string.
 
     Args:
-        event: the question's position in the trace.
-        number: the option's position in the question.
+        event: the question's position in the trace, counted from 0.
+        number: the option's position in the question, counted from 0.
         option: the option.
     """
 
@@ -64,7 +64,7 @@ def _test_holds(test: formulas.Test, trace: Trace) -> bool:
 
 
 def positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
-    """Return the positions where a matching event makes a test hold, such as only the last one for `Last`."""
+    """Return the positions where a matching event would make a test hold; for `Last`, only the last one."""
     span = positions_in_scopes(test.stay if isinstance(test, formulas.ActAtFirst) else test.scopes, trace)
     if isinstance(test, formulas.ActAtSome):
         return during_stays(test, trace, span)
@@ -72,7 +72,7 @@ def positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
 
 
 def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
-    """Whether a pattern matches an event at a position of its trace.
+    """Whether a pattern matches an event. Errors name its position `at` in the trace, counted from 0.
 
     Raises:
         Inconclusive: an option that is not a string precedes the first match.
@@ -127,7 +127,7 @@ def at_least(element: formulas.EventPattern, number: int, trace: Trace, span: ra
 
 
 def positions_in_scopes(scopes: tuple[formulas.Scope, ...], trace: Trace) -> range:
-    """Return the positions in a trace that are within all scopes."""
+    """Return the positions in a trace, counted from 0, that are within all scopes."""
     span = range(len(trace))
     for scope in scopes:
         span = narrow(scope, bounding_event(scope, trace, span), span)
@@ -135,13 +135,13 @@ def positions_in_scopes(scopes: tuple[formulas.Scope, ...], trace: Trace) -> ran
 
 
 def bounding_event(scope: formulas.Scope, trace: Trace, span: range) -> int | None:
-    """Return where a scope ends or begins: at the first or last matching event of a span, or None."""
+    """Return the position of the event that bounds a scope within a span, or None if no event matches."""
     found = occurrences(scope.element, trace, span)
     return next(found, None) if scope.name.endswith("First") else max(found, default=None)
 
 
 def narrow(scope: formulas.Scope, at: int | None, span: range) -> range:
-    """Return the part of a span in a scope. Its bounding event is at position `at`, or missing if None."""
+    """Return the part of a span in a scope whose bounding event is at position `at`, or None if missing."""
     if at is None:
         return range(span.stop, span.stop) if scope.is_only else span
     return range(span.start, at) if scope.is_before else range(at + 1, span.stop)

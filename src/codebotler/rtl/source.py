@@ -16,7 +16,7 @@ _MAX_SHOWN_LENGTH = 40
 
 
 class RtlSyntaxError(ValueError):
-    """Raised for a string that is not a formula, with a message that says where and why.
+    """Raised for a string that is not a formula, with a message that gives the column and the reason.
 
     Args:
         column: the position, counted from 1.
@@ -41,7 +41,7 @@ class FormulaSource:
         self.bytes = self.text.encode(errors="replace")  # `ast` counts columns in bytes
 
     def unknown(self, at: ast.expr, what: str, name: str, known: Iterable[str]) -> RtlSyntaxError:
-        """Return the error for an unknown name of a `what`, such as a test. It hints at a name in `known`."""
+        """Return the error for an unknown name of a `what`, such as `test`, with a hint at `known` names."""
         close = [SKILL_KINDS[name]] if name in SKILL_KINDS else get_close_matches(name, known, 1)
         hint = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(known)}"
         if name == INSIDE:

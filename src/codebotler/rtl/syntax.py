@@ -48,7 +48,7 @@ def parse(
     means: Mapping[str, str] = NO_MEANINGS,
     sets: Mapping[str, Sequence[str]] | None = None,
 ) -> formulas.Formula:
-    """Parse a formula.
+    """Parse a formula, such as `tr.Exists(goto("lobby"))`.
 
     Args:
         text: the formula; a line break counts as a space.
@@ -90,19 +90,19 @@ class _Parser(FormulaSource):
             tree = parse_expression(self.text)
         except SyntaxError as error:
             column = self.indent + max(error.offset or 1, 1)
-            raise RtlSyntaxError(column, f"this cannot be read ({error.msg})") from None
+            raise RtlSyntaxError(column, f"the formula cannot be read ({error.msg})") from None
         except (RecursionError, MemoryError):
-            raise RtlSyntaxError(self.indent + 1, "this is nested too deeply") from None
+            raise RtlSyntaxError(self.indent + 1, "the formula is nested too deeply") from None
         except ValueError as error:
-            raise RtlSyntaxError(self.indent + 1, f"this cannot be read ({error})") from None
+            raise RtlSyntaxError(self.indent + 1, f"the formula cannot be read ({error})") from None
         end = tree.end_col_offset or 0
         if b"#" in self.bytes[end:]:  # a comment would hide all following lines
-            raise self.error(end, "RTL has no comments, but one starts after this")
+            raise self.error(end, "RTL has no comments; remove the one after the formula")
         return self.constraint(tree, 0)
 
     def constraint(self, node: ast.expr, depth: int) -> formulas.Formula:
         if depth > MAX_FORMULA_DEPTH:
-            raise self.error(node, f"this is nested more than {MAX_FORMULA_DEPTH} levels deep")
+            raise self.error(node, f"the formula is nested more than {MAX_FORMULA_DEPTH} levels deep")
         match node:
             case ast.BoolOp(op, values):
                 parts = tuple(self.constraint(value, depth + 1) for value in values)
@@ -239,7 +239,7 @@ class _Parser(FormulaSource):
         if wanted.base == "str":
             text = self.matched(node)
             if wanted.choices and not any(text.matches(as_text(one)) for one in wanted.choices):
-                raise self.error(node, f"this is not one of {', '.join(map(as_text, wanted.choices))}")
+                raise self.error(node, f"the text is not one of {', '.join(map(as_text, wanted.choices))}")
             return text
         if wanted.base == "bool" and not (
             isinstance(node, ast.Constant) and isinstance(node.value, bool | str)
@@ -310,7 +310,7 @@ class _Parser(FormulaSource):
 
     def word(self, node: ast.expr) -> str:
         pattern = self.regex(node)
-        self.check_regex(node, pattern, whole_word, "this regex cannot be searched as a whole word")
+        self.check_regex(node, pattern, whole_word, "the regex cannot be searched as a whole word")
         return pattern
 
     def regex(self, node: ast.expr) -> str:
@@ -318,11 +318,11 @@ class _Parser(FormulaSource):
             case ast.Constant(str(pattern)):
                 if "\b" in pattern:
                     raise self.error(
-                        node, 'this string contains a backspace; write r"..." so that \\b is a word boundary'
+                        node, 'the string contains a backspace; write r"..." so that \\b is a word boundary'
                     )
                 if self.sets is not None:
                     pattern = SET_TAG.sub(lambda tag: self.alternation(tag, node), pattern)
-                self.check_regex(node, pattern, compile_regex, "this is not a valid regex")
+                self.check_regex(node, pattern, compile_regex, "the string is not a valid regex")
                 return pattern
         raise self.expected("a string", node)
 

@@ -76,7 +76,7 @@ def _describe_details(element: EventPattern, means: str | None) -> str:
 
 
 def is_clear(element: EventPattern) -> bool:
-    """Whether words can describe the whole pattern, so that no regex in it is too complex to spell out."""
+    """Whether words can describe the whole pattern: no regex in the pattern is too complex for words."""
     texts = [element.text, element.options, element.answer, element.holding, element.to, *element.more]
     needed = texts[3:] if element.means is not None else texts
     if element.place is not None:
@@ -114,7 +114,7 @@ def _words_of(pattern: str) -> str:
 
 
 def describe_event(event: Event, element: EventPattern, form: VerbForm = "past") -> str:
-    """Describe an event, including its room, addressee and held object if `element` compares them."""
+    """Describe an event. Include its room, addressee and held object only if `element` compares them."""
     if event.kind in {GOTO, INSIDE}:
         done = f"{getattr(verb(event.kind), form)} {room_name(event.text)}"
     else:

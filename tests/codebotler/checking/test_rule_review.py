@@ -164,10 +164,18 @@ def test_name_that_the_world_lacks_has_a_warning() -> None:
 @pytest.mark.parametrize(
     ("one", "other", "warnings"),
     [
-        ('not tr.AtLeast(goto("hall"), 2)', 'not tr.AtLeast(goto("hall"), 3)', ["", 'it follows from "r0"']),
-        ('not tr.AtLeast(goto("hall"), 3)', 'not tr.AtLeast(goto("hall"), 2)', ['it follows from "r1"', ""]),
-        (NO_OFFICE, 'tr.Count(goto("office"), 0)', ["", 'it is equivalent to "r0"']),
-        (NO_OFFICE, KNOCK, ["", 'it follows from "r0"']),
+        (
+            'not tr.AtLeast(goto("hall"), 2)',
+            'not tr.AtLeast(goto("hall"), 3)',
+            ["", 'this rule follows from "r0"'],
+        ),
+        (
+            'not tr.AtLeast(goto("hall"), 3)',
+            'not tr.AtLeast(goto("hall"), 2)',
+            ['this rule follows from "r1"', ""],
+        ),
+        (NO_OFFICE, 'tr.Count(goto("office"), 0)', ["", 'this rule is equivalent to "r0"']),
+        (NO_OFFICE, KNOCK, ["", 'this rule follows from "r0"']),
         (NO_OFFICE, 'not tr.Exists(say("hush"))', ["", ""]),
     ],
 )
@@ -180,9 +188,9 @@ def test_contradictory_rules_have_a_warning() -> None:
     (always,) = rules(NO_OFFICE)
     (end,) = rules('tr.Exists(goto("office"))', when="finally")
     _, review = review_rules([always, Rule("end", "Go there.", end.formula, "finally")])
-    assert review.warnings == ('it cannot be kept together with "r0"',)
+    assert review.warnings == ('this rule cannot be kept together with "r0"',)
     several = rules('tr.Exists(say("a"))', 'not tr.Exists(say("a"))', when="finally")
-    assert review_rules(several)[1].warnings == ('it cannot be kept together with "r0"',)
+    assert review_rules(several)[1].warnings == ('this rule cannot be kept together with "r0"',)
 
 
 def test_step_sentence_shows_everything_that_rules_compare() -> None:
@@ -213,9 +221,9 @@ def test_examples_of_a_leaving_rule_show_the_end(world: World | None) -> None:
 @pytest.mark.parametrize(
     ("when", "warnings"),
     [
-        ("always", ["", 'it follows from "r0"']),
-        ("leaving", ["", 'it is equivalent to "r0"']),
-        ("finally", ['it follows from "leave"', ""]),
+        ("always", ["", 'this rule follows from "r0"']),
+        ("leaving", ["", 'this rule is equivalent to "r0"']),
+        ("finally", ['this rule follows from "leave"', ""]),
     ],
 )
 def test_leaving_rules_are_compared_with_others(when: str, warnings: list[str]) -> None:
@@ -228,7 +236,7 @@ def test_leaving_rules_are_compared_with_others(when: str, warnings: list[str]) 
 def test_leaving_rule_that_contradicts_another_has_a_warning() -> None:
     (silent,) = rules('not tr.Exists(say(".*"))')
     found = review_rules([silent, leaving_rule("bye", 'tr.Exists(say("bye"))')])
-    assert found[1].warnings == ('it cannot be kept together with "r0"',)
+    assert found[1].warnings == ('this rule cannot be kept together with "r0"',)
     (review,) = review_rules([leaving_rule("never", 'tr.Exists(say("a")) and not tr.Exists(say("a"))')])
     assert IMPOSSIBLE in review.warnings
 

@@ -176,7 +176,7 @@ def test_leaving_rule_may_be_false_at_first_and_refuse(tmp_path: Path) -> None:
         (
             "rules:\n  - name: a\n    says: b\n    always: not tr.Exist(goto('x'))\n",
             4,
-            ["column 8 of it, at Exist(goto(", "Exists?"],
+            ["column 8, at Exist(goto(", "Exists?"],
         ),
         ("rules:\n  - name: a\n    says: b\n    always: tr.Exists(fly('x'))\n", 4, ["unknown element fly"]),
         (

@@ -149,7 +149,7 @@ def test_warning_names_a_skill_whose_steps_rules_do_not_see(files: Path) -> None
     ):
         ended = codebotler(files, *arguments, *own)
         assert ended.status == 0, ended
-        assert "do not see inside the skill tour" in " ".join(ended.err.split())
+        assert "do not see what the skill tour makes the robot do" in " ".join(ended.err.split())
 
 
 THROUGH = "def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n"

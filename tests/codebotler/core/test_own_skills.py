@@ -291,9 +291,9 @@ FAULTY_FILES = {
     "@skill(event='a b')\ndef wiggle(sim) -> None: 'Wiggle.'": 'formulas cannot use "a b" as a name',
     "@skill\ndef wiggle(sim, who: str) -> 'int | None': 'Wiggle.'": "the result of wiggle is int | None,",
     "@skill(text='whom')\ndef wiggle(sim, who: str) -> None: 'Wiggle.'": "wiggle has no parameter whom",
-    "def wiggle(sim, who: str) -> None: 'Wiggle.'": "it declares no skill; put @skill above a function",
-    "def wiggle(": "it is not Python",
-    "1 / 0": "it cannot be run: ZeroDivisionError",
+    "def wiggle(sim, who: str) -> None: 'Wiggle.'": "the file declares no skill; put @skill above a function",
+    "def wiggle(": "the file is not Python",
+    "1 / 0": "the file cannot be run: ZeroDivisionError",
 }
 
 
@@ -314,7 +314,7 @@ def test_faulty_file_is_an_error_with_its_line(tmp_path: Path, source: str) -> N
 @pytest.mark.parametrize(
     ("body", "message"),
     [
-        ("return 3", "wiggle returned 3, but it declares bool"),
+        ("return 3", "wiggle returned 3, but its function must return True or False"),
         ("sim.fail('Other')", 'wiggle declares no error "Other"'),
     ],
 )
@@ -414,8 +414,8 @@ def test_minus_zero_is_zero_to_formulas(pool: WorkerPool, typed: SkillTable) -> 
 @pytest.mark.parametrize(
     ("formula", "message"),
     [
-        ('tr.Exists(paint("green"))', "this is not one of red, blue"),
-        ('tr.Exists(paint("red", "floor"))', "this is not one of door, wall"),
+        ('tr.Exists(paint("green"))', "the text is not one of red, blue"),
+        ('tr.Exists(paint("red", "floor"))', "the text is not one of door, wall"),
         ('tr.Exists(whole("two"))', "expected a whole number, or a regex for it"),
         ("tr.Exists(truth(1))", "expected True or False"),
         ("tr.Exists(returned(True, whole(1)))", "returned needs a skill that returns True or False"),

@@ -328,7 +328,7 @@ def test_a_robot_that_does_not_connect_is_not_ready(write: Write) -> None:
             "class Spot:\n    def __init__(self): 1 / 0\n    stop = rooms = print\n",
             r"Spot\(\) failed: ZeroDiv",
         ),
-        ("1 / 0\n", r"line 1: it cannot be run: ZeroDivisionError"),
+        ("1 / 0\n", r"line 1: the file cannot be run: ZeroDivisionError"),
     ],
 )
 def test_error_names_the_fault_of_a_class(tmp_path: Path, source: str, message: str) -> None:

@@ -30,7 +30,7 @@ class ContractFile(BaseModel):
 
 
 def read_contract(path: Path, skills: SkillTable = SKILLS) -> Contract:
-    """Read a contract.
+    """Read a contract from a YAML file.
 
     Args:
         path: the file.
@@ -67,14 +67,14 @@ def _read_bound(file: YamlFile, row: Skill, given: Mapping[str, Any]) -> SkillBo
     for key, value in given.items():
         where = "skills", row.name, key
         if key not in known:
-            raise file.wrong(f'{row.name} has no "{key}"; write {", ".join(known)}', *where)
+            raise file.wrong(f'{row.name} has no key "{key}"; its keys are {", ".join(known)}', *where)
         is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
         if not (type(value) is int and value > 0 if key == AT_MOST else value == ANY or is_list):
             needed = "a whole number above 0" if key == AT_MOST else "any, or a list of texts in quotes"
             raise file.wrong(f'"{key}" must be {needed}', *where)
     missing = [name for name in names if name not in given]
     if missing:
-        sentence = f'{row.name} lacks "{missing[0]}"; write a list of texts, or any'
+        sentence = f'{row.name} lacks the key "{missing[0]}"; write a list of texts, or any'
         raise file.wrong(sentence, "skills", row.name)
     texts = tuple((name, _templates(file, row, name, given[name])) for name in names)
     places = None if IN not in given or given[IN] == ANY else tuple(given[IN])

@@ -45,7 +45,7 @@ def contract_rows(
 def contract_sentence(
     contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief_part, *, is_short: bool = True
 ) -> str:
-    """Say in a sentence or two what a program may do at most, and what it never does.
+    """Return a sentence or two about what a program may do at most, and what it never does.
 
     If `is_short`, long lists end with a number, such as "or 4 more"; show a table of all texts as well.
     """

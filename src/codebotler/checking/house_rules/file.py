@@ -35,7 +35,7 @@ def _as_name(text: str) -> str:
 
 def _as_set_name(text: str) -> str:
     if text == "each" or not SET_TAG.fullmatch(f"{{{text}}}"):
-        raise ValueError("needs a letter, then letters, digits, spaces or underscores, and may not be each")
+        raise ValueError('needs a letter, then letters, digits, spaces or underscores; "each" is reserved')
     return text
 
 
@@ -70,7 +70,7 @@ class HouseRuleFile(BaseModel):
         formula = self._formula(text, file, (*at, when), skills, sets)
         if when == "always" and not holds(formula, ()):
             sentence = f'the rule "{self.name}" is broken before anything has happened'
-            mend = 'begin with when it counts, as in: not tr.Last(goto(".*")) or ..., or write "finally"'
+            mend = 'begin with a condition, as in: not tr.Last(goto(".*")) or ..., or write "finally"'
             raise file.wrong(f"{sentence}; {mend}", *at, "always")
         return Rule(self.name, self.says, formula, when, self.refuse, self.any_)
 
@@ -148,8 +148,8 @@ def _parse(text: str, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Se
         formula = parse(text, skills=skills.with_skill(POSE_IN_ROOM), sets=sets)
     except RtlSyntaxError as error:
         there = brief(text[error.column - 1 :], MAX_QUOTED_CHARACTERS)
-        where = f"column {error.column} of it" + (f", at {there}" if there else "")
-        raise file.wrong(f"this is not a formula: {where}: {error.problem}", *at) from None
+        where = f"column {error.column}" + (f", at {there}" if there else "")
+        raise file.wrong(f"the formula is wrong in {where}: {error.problem}", *at) from None
     for element in elements(formula):
         for pattern in _regexes(element):
             if slow_text(pattern) is not None:

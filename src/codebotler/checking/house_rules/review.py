@@ -21,13 +21,13 @@ from codebotler.simulator.guard.house_rule import Rule, RuleViolationError, When
 from codebotler.simulator.guard.rule_guard import RuleGuard, name_of
 from codebotler.simulator.worlds.matching import WORDS_FOR_PEOPLE, meant_by
 
-NEVER_BROKEN = "nothing can break it; look for a misspelt name, or for a part that is always true"
-ALWAYS_BROKEN = "everything that a robot can do breaks it"
-IMPOSSIBLE = "no program can keep it"
-UNDECIDED = 'it is too complex for examples, but still enforced; split it at "and" into several rules'
+NEVER_BROKEN = "nothing can break this rule; look for a misspelt name, or for a part that is always true"
+ALWAYS_BROKEN = "everything that a robot can do breaks this rule"
+IMPOSSIBLE = "no program can keep this rule"
+UNDECIDED = 'this rule is too complex for examples, but still enforced; split it at "and" into several rules'
 DETECTED = (
-    "the result of a look or an answer can break it; "
-    "this cannot be prevented, so the mission stops right afterwards"
+    "the result of a look or an answer can break this rule; "
+    "results cannot be prevented, so the mission stops right afterwards"
 )
 OTHER_ANSWER = "something else"  # an answer that no rule names
 ORDER: Sequence[WhenJudged] = ("always", "leaving", "finally")  # by how often each is judged
@@ -45,7 +45,7 @@ class Review:
 
 
 def review_rules(rules: Sequence[Rule], world: World | None = None) -> list[Review]:
-    """Find examples and warnings for each rule. Examples use the rooms of the world if there is one."""
+    """Return examples and warnings for each rule. With a world, the examples use its rooms."""
     found = {rule.name: _review(rule, world) for rule in rules}
     for one, other in combinations(rules, 2):
         for rule, warning in _pair_warnings(one, other, world):
@@ -179,17 +179,17 @@ def _pair_warnings(one: Rule, other: Rule, world: World | None) -> Iterator[tupl
         return
     try:
         if _conflict(one, other, world):
-            yield other, f'it cannot be kept together with "{one.name}"'
+            yield other, f'this rule cannot be kept together with "{one.name}"'
             return
         follows = [_follows(one, other, world), _follows(other, one, world)]
     except Undecided:
         return
     if all(follows):
-        yield other, f'it is equivalent to "{one.name}"'
+        yield other, f'this rule is equivalent to "{one.name}"'
     elif follows[0]:
-        yield one, f'it follows from "{other.name}"'
+        yield one, f'this rule follows from "{other.name}"'
     elif follows[1]:
-        yield other, f'it follows from "{one.name}"'
+        yield other, f'this rule follows from "{one.name}"'
 
 
 def _conflict(one: Rule, other: Rule, world: World | None) -> bool:
@@ -222,4 +222,4 @@ def _unknown_names(rule: Rule, world: World | None) -> Iterator[str]:
         sort = row.recording.names if row is not None and row.recording is not None else ""
         for text in (element.holding, element.to, element.text if "object" in sort else None):
             if isinstance(text, Regex) and not may_mean(text.pattern, known):
-                yield f'it names "{text.pattern}", which is not in this world'
+                yield f'this rule names "{text.pattern}", which is not in this world'

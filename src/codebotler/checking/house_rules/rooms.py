@@ -21,7 +21,7 @@ from codebotler.simulator.worlds.matching import is_in_request, meant_by
 
 
 def unknown_rooms_in(rule: Rule, rooms: Sequence[str]) -> Iterator[str]:
-    """Yield a sentence for each room that a rule names but the house lacks, unless `rooms` is empty."""
+    """Yield a sentence for each room that a rule names but that is not in `rooms`; none if this is empty."""
     if rule.any_room or not rooms:
         return
     poses = {pattern for one in rule.inside for pattern in patterns(one.text)}
@@ -44,7 +44,7 @@ def room_patterns(rule: Rule) -> Iterator[str]:
 
 
 def may_mean(pattern: str, labels: Iterable[str]) -> bool:
-    """Return whether a regex may refer to one of the labels. If it matches all or nothing, assume so."""
+    """Whether a regex may refer to one of the labels. True if it matches everything or nothing."""
     matches, texts = Regex(pattern).matches, samples(pattern)
     return (
         not texts
@@ -82,7 +82,7 @@ def find_evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTabl
     ]
     if rules and unseen:
         yield (
-            f"rules do not see inside the skill {listed(unseen)} while the robot moves; "
+            f"rules do not see what the skill {listed(unseen)} makes the robot do; "
             "name the skill in each rule that should limit it"
         )
 

@@ -22,7 +22,7 @@ A_ROOM: TextLiteral = (0, 0, "")  # the placeholder for the name of a room that 
 
 
 def named_rooms(tree: ast.Module, skills: SkillTable = SKILLS) -> tuple[str, ...]:
-    """Return the names that a program drives to or compares with rooms, in the order of its source."""
+    """Return the names of rooms that a program drives to or compares, in the order of its source."""
     try:
         return tuple(dict.fromkeys(_RoomNames(tree, skills).rooms()))[:MAX_NAMED_ROOMS]
     except RecursionError:
@@ -30,7 +30,7 @@ def named_rooms(tree: ast.Module, skills: SkillTable = SKILLS) -> tuple[str, ...
 
 
 def fixed_drives(tree: ast.Module, skills: SkillTable = SKILLS) -> list[tuple[int, str]]:
-    """Return the line and the room of each drive that names its room, such as `go_to("hall")`.
+    """Return the line, from 1, and the room of each drive with a fixed room, such as `go_to("hall")`.
 
     Drives to rooms that the program uses in comparisons are omitted, since it may check that they exist.
     """

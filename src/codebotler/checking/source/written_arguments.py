@@ -56,7 +56,7 @@ class WrittenArguments:
 
 
 def read_arguments(program: str, skills: SkillTable) -> WrittenArguments:
-    """Return the texts that a program passes to its skills. If its source cannot be read, allow any text."""
+    """Return the texts that a program passes to its skills: any text if its source cannot be read."""
     parameters = [(row.name, [one.name for one in row.parameters]) for row in skills.rows]
     try:
         found, reads_clock = _read(program, parameters)

@@ -15,7 +15,7 @@ SKILL_FAILED = "SkillFailed"
 
 
 def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - the declared type
-    """Call the function of a skill, and raise UserError if its result does not have the declared type."""
+    """Call a custom skill's function. Raise RobotError if it fails, or UserError if its result is wrong."""
     assert row.does is not None, "a custom skill has a function"
     given = [
         [option.text for option in argument] if parameter.is_options else parameter.type.wanted(argument)
@@ -37,5 +37,6 @@ def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # n
         ) from error
     asks = [one for one, parameter in zip(given, row.parameters, strict=True) if parameter.is_options]
     if (asks and result not in asks[0]) or not row.returns.fits(result):
-        row.wrong(f"{row.name} returned {result!r:.80}, but it declares {row.returns.annotation}")
+        must = "one of the given options" if asks else row.returns.words
+        row.wrong(f"{row.name} returned {result!r:.80}, but its function must return {must}")
     return result

@@ -74,7 +74,7 @@ def skill(**options: Unpack[SkillOptions]) -> Callable[[Callable[..., Any]], Ski
 def skill(
     does: Callable[..., Any] | None = None, /, **options: Unpack[SkillOptions]
 ) -> Skill | Callable[[Callable[..., Any]], Skill]:
-    """Declare a skill as a function that acts on a simulated robot, which is its first parameter.
+    """Declare a skill: put `@skill` above a function whose first parameter is the simulated robot.
 
     A function with an empty body (`...`) records the skill's event and returns a random value of its type. In
     some sampled worlds, it fails with one of the skill's errors.
@@ -111,9 +111,7 @@ class _Declaration:
         fails = self.fails()
         doc = " ".join((self.does.__doc__ or "").split("\n\n")[0].split())
         if not doc:
-            self.wrong(
-                f"{self.name} has no docstring; begin it with a sentence that says what the skill does"
-            )
+            self.wrong(f"{self.name} has no docstring; add a sentence that says what the skill does")
         row = Skill(
             self.name,
             parameters,
@@ -142,7 +140,7 @@ class _Declaration:
             for sentence in wrong_options(self.options):
                 self.wrong(sentence)
         if not 0 <= self.options.get("seconds", 0.0) < inf:
-            self.wrong("the option seconds must be at least 0")
+            self.wrong(f"the option seconds is {self.options['seconds']}; write a number of at least 0")
 
     def check_name(self) -> None:
         is_second = isinstance(self.does.__globals__.get(self.name), Skill)
@@ -153,7 +151,7 @@ class _Declaration:
         event = self.options.get("event") or self.name
         for word in (event, self.options.get("sets"), self.options.get("clears")):
             if word and (word in RTL_WORDS or iskeyword(word) or not word.isidentifier()):
-                self.wrong(f'formulas cannot use "{word}" as a name; choose another one')
+                self.wrong(f'formulas cannot use "{word}" as a name; choose another event or state')
 
     def parameters(self) -> tuple[Parameter, ...]:
         if iscoroutinefunction(self.does):
@@ -164,7 +162,7 @@ class _Declaration:
         if not taken or not is_plain or value_type(self.annotation(first) or object) is not None:
             self.wrong(
                 f"{self.name} must take the simulation first, then the arguments of programs without default "
-                "values, as in (sim: Simulation, door: str)"
+                "values; write parameters such as (sim: Simulation, door: str)"
             )
         for name in names:
             if name not in self.does.__annotations__:
@@ -218,11 +216,11 @@ class _Declaration:
         text = self.options.get("text") or next((name for name in names if name != to), "")
         for name in filter(None, (text, to)):
             if name not in names:
-                self.wrong(f"{self.name} has no parameter {name}")
+                self.wrong(f"{self.name} has no parameter {name}; correct the option text or to")
         if to and options is None:
-            self.wrong("`to` is only for questions, which have a parameter options: list[str]; leave it out")
+            self.wrong("`to` is only for questions, which have a parameter options: list[str]; remove `to`")
         if (sets or clears) and (not text or options or sets == clears):
-            self.wrong(f"{self.name} must set or clear a state of the thing that its parameter names")
+            self.wrong(f"{self.name} must set or clear a state of the thing in a parameter, but not both")
         more = tuple(name for name in names if name not in {text, to})
         tried = self.options.get("when_tried")
         is_judged = tried is True or (tried is None and (bool(sets) or not clears))
@@ -265,7 +263,7 @@ class _Declaration:
             )
         unusable = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
         if unusable:
-            self.wrong(f"{unusable[0]} of {self.name} cannot be a ROS field; use lower-case letters")
+            self.wrong(f"the parameter {unusable[0]} of {self.name} cannot be a ROS field; use a-z, 0-9, _")
         package, kind, server = written.groups()
         goal = tuple(f"{_ros_type(each.type)} {each.name}" for each in parameters)
         result = None if returns.base is None else _ros_type(returns)

@@ -26,7 +26,7 @@ def skills_from(*files: Path | str) -> SkillTable:
     for path in {Path(file).resolve(): Path(file) for file in files}.values():
         found = _declared_skills(path)
         if not found:
-            raise UserError("it declares no skill; put @skill above a function", file=path)
+            raise UserError("the file declares no skill; put @skill above a function", file=path)
         for row in found:
             _expect_new(row, rows)
             rows.append(row)
@@ -40,14 +40,14 @@ def _declared_skills(path: Path) -> list[Skill]:
 
 
 def files_of(skills: SkillTable) -> dict[str, str]:
-    """Map the name of each file that declares skills of a table to the SHA-256 hash of its content."""
+    """Return the SHA-256 hash, in hexadecimal, of each file that declares skills of a table, by file name."""
     modules = {getattr(row.does, "__module__", "") for row in skills.rows}
     paths = {Path(location_of(name)) for name in modules if is_own_module(name)}
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(paths)}
 
 
 def load_skill_module(path: Path) -> ModuleType:
-    """Run a file once and return its module, or raise UserError if it fails."""
+    """Run a file of custom skills once, and return its module. Raise UserError if the file fails."""
     try:
         return load_own_module(path)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - the file may raise anything
@@ -59,10 +59,10 @@ def _as_user_error(path: Path, error: BaseException) -> UserError:
     if isinstance(error, UserError) and error.file is not None:
         return error
     if isinstance(error, SyntaxError):
-        return UserError(f"it is not Python: {error.msg}", file=path, line=error.lineno)
+        return UserError(f"the file is not Python: {error.msg}", file=path, line=error.lineno)
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
     is_ours = isinstance(error, UserError)
-    sentence = str(error) if is_ours else f"it cannot be run: {type(error).__name__}: {error}"
+    sentence = str(error) if is_ours else f"the file cannot be run: {type(error).__name__}: {error}"
     return UserError(sentence, file=path, line=lines[-1] if lines else None)
 
 

@@ -21,7 +21,7 @@ def is_own_module(name: str) -> bool:
 
 
 def load_own_module(path: Path) -> ModuleType:
-    """Run a file once and return its module.
+    """Run a file of custom skills once, and return its module. A later call returns the same module.
 
     Raises:
         UserError: the file cannot be read.
@@ -30,7 +30,7 @@ def load_own_module(path: Path) -> ModuleType:
     try:
         source = path.read_bytes()
     except OSError as error:
-        raise UserError(f"it cannot be read ({error.strerror})", file=path) from None
+        raise UserError(f"the file cannot be read ({error.strerror})", file=path) from None
     where = str(path.resolve())
     name = OWN_MODULES + hashlib.sha256(where.encode() + b"\0" + source).hexdigest()[:16]
     if name in sys.modules:
@@ -52,11 +52,11 @@ def load_own_module(path: Path) -> ModuleType:
 
 
 def location_of(module: str) -> str:
-    """Return the path of a custom skill file, or else the module's name, as `find_object` expects it."""
+    """Return the `place` of a module for `find_object`: the path of a custom skill file, else its name."""
     return str(sys.modules[module].__file__) if is_own_module(module) else module
 
 
 def find_object(place: str, name: str) -> object:
-    """Import a module and return its object named `name`; `place` is a result of `location_of`."""
+    """Import the module that `location_of` has located at `place`, and return its object named `name`."""
     module = load_own_module(Path(place)) if place.endswith(".py") else import_module(place)
     return getattr(module, name)

@@ -23,8 +23,8 @@ class Simulation(Protocol):
     def look(self, entity: str) -> bool:
         """Return whether an object or a person is in the robot's room."""
 
-    def ask(self, person: str, question: str, options: Sequence[Any]) -> Any:  # noqa: ANN401 - an option, or its number
-        """Ask a person in the robot's room, and return the option that they choose."""
+    def ask(self, person: str, question: str, options: Sequence[Any]) -> Any:  # noqa: ANN401 - an int, but `ask` declares str
+        """Ask a person in the robot's room, and return the position, from 0, of the option they choose."""
 
     def take(self, obj: str) -> None:
         """Pick up an object in the robot's room."""
@@ -40,13 +40,13 @@ class Simulation(Protocol):
         """A dictionary in which skills keep data during a run, such as which doors are open."""
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - the skill's type
-        """Return a random result for a skill with an empty body, or raise one of its errors."""
+        """Return the result of a skill with an empty body, from `truths` or at random, or raise its error."""
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return the names of things, such as `things("kitchen", "fruit")` for all fruit in the kitchen."""
+        """Return the names of all things, or of some: `things("kitchen", "fruit")` for fruit in a kitchen."""
 
     def people(self, where: str = "", is_: str = "", **traits: str) -> list[str]:
-        """Return the names of people, such as `people("lobby", wears="red coat")`. Filters are optional."""
+        """Return the names of all people, or of some: `people("lobby", wears="red coat")`."""
 
     def traits(self, name: str) -> Mapping[str, Any]:
         """Return the properties of a thing or person, such as `{"wears": "red coat"}`."""

@@ -35,7 +35,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Recording:
-    """How a skill becomes an event in the trace when it is called."""
+    """How a call of a skill becomes an event in the trace."""
 
     kind: str  # the kind of event and its name in RTL, such as `goto`
     text: str  # the parameter that becomes the event's text; empty for no text
@@ -139,7 +139,7 @@ class Skill:
         return self.example or written_call(self.name, [_sample(each) for each in self.parameters])
 
     def wrong(self, sentence: str) -> NoReturn:
-        """Raise a UserError with the file and the line of its function."""
+        """Raise a UserError with this sentence, and with the file and the line of the skill's function."""
         refuse(self.does, sentence)
 
     @property
@@ -150,7 +150,7 @@ class Skill:
 
 
 def refuse(does: Callable[..., Any] | None, sentence: str) -> NoReturn:
-    """Raise a UserError with the file and the line of a function, if known."""
+    """Raise a UserError with a sentence and, if they are known, the file and the line of a function."""
     code = getattr(getattr(does, "__wrapped__", does), "__code__", None)
     if code is None:
         raise UserError(sentence)
@@ -219,7 +219,7 @@ class SkillTable(Mapping[str, Skill]):
         return SkillTable((*self.rows, skill))
 
     def with_skills(self, others: Mapping[str, Skill]) -> SkillTable:
-        """Return a copy of this table, extended by the skills that only the other table has."""
+        """Return a copy of this table with those skills of another table whose names this table lacks."""
         return SkillTable((*self.rows, *(row for name, row in others.items() if name not in self)))
 
     def without(self, names: Iterable[str]) -> SkillTable:

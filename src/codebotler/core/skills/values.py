@@ -67,7 +67,7 @@ class ValueType:
         return f"a list of {many}" if self.is_list else one
 
     def fits(self, value: object) -> bool:
-        """Whether a value has exactly this type, except that an integer is also a float."""
+        """Whether a value has this type and is among the choices, if any. An integer also fits `float`."""
         if self.base is None:
             return value is None
         if self.is_list:
@@ -140,7 +140,7 @@ def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueTy
 
 
 def sample_values(value: ValueType, names: Sequence[str] = ()) -> tuple[Any, ...]:
-    """Return some values of a type to choose random results from; texts are chosen from `names`, if any."""
+    """Return values of a type from which a random result can be chosen. Texts come from `names`, if given."""
     if value.is_list:
         some = sample_values(replace(value, is_list=False), names)
         return [some[0]], [], [some[0], some[-1]]

@@ -46,7 +46,7 @@ class Verb:
     object: str = ""  # `{} ml of {} into {}`, used for several texts
 
     def with_object(self, form: str, arguments: Sequence[str], quote: str = '"') -> str:
-        """Add objects to a verb form: `opened "door"` or, with `object`, `poured 5 ml of tea into cup`."""
+        """Add texts to a verb form: `opened "door"` or, with `object`, `poured 5 ml of tea into cup`."""
         if not self.object:
             return " ".join([form, *(f"{quote}{text}{quote}" for text in arguments)])
         missing = ["something"] * (self.object.count("{") - len(arguments))
@@ -54,7 +54,7 @@ class Verb:
 
 
 def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], past: str = "") -> Verb:
-    """Build the verb that a template such as `open {door}` declares.
+    """Build a verb from a template such as `open {door}`, and the words for the results False and True.
 
     Raises:
         ValueError: the template has no verb, or braces around something other than a parameter.

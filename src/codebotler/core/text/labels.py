@@ -69,7 +69,7 @@ def scope_flags(pattern: str) -> str:
 
 @lru_cache(maxsize=1024)
 def expect_quick(pattern: str) -> None:
-    """Raise SlowRegexError if a regex breaks the rule described at the top of this module."""
+    """Raise SlowRegexError if a search for a regex may be slow, by the rule at the top of this module."""
     if pattern != ANY_LABEL:
         pattern = pattern.removeprefix(ANY_LABEL)
         pattern = pattern if pattern.endswith("\\.*") else pattern.removesuffix(ANY_LABEL)
@@ -77,7 +77,7 @@ def expect_quick(pattern: str) -> None:
     if endless > 1:
         raise SlowRegexError("two repetitions are unlimited; limit them, as in .{0,50}")
     if ways > (MAX_WAYS_BESIDE_ENDLESS if endless else MAX_WAYS):
-        raise SlowRegexError("it can match a string in too many ways; use fewer repetitions and alternatives")
+        raise SlowRegexError("a text can match in too many ways; use fewer repetitions and alternatives")
 
 
 def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `re`
@@ -94,7 +94,7 @@ def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `r
 
 def _cost_of(op: str, value: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `re`
     if op in UNSUPPORTED_OPCODES:
-        raise SlowRegexError("it refers back to a group; write out the text instead")
+        raise SlowRegexError("the regex refers back to a group; write out the text instead")
     if op in REPEAT_OPCODES:
         return _cost_of_repeat(*value)
     if op == "BRANCH":
@@ -110,5 +110,5 @@ def _cost_of_repeat(least: int, most: int, repeated: Any) -> tuple[int, int]:  #
         ways, endless = _cost(repeated)
         return 1 + ways, endless
     if [str(op) for op, _ in repeated][1:] or str(repeated[0][0]) not in SINGLE:
-        raise SlowRegexError("a repetition contains more than one character; write it out")
+        raise SlowRegexError("a repetition contains more than one character; write out the repeated text")
     return (1, 1) if most > ENDLESS_REPEATS else (most - least + 1, 0)

@@ -22,8 +22,8 @@ class TextTemplate:
 
     Args:
         parts: the pieces around the holes, such as `("Go to the ", ".")`. A single piece has no hole, and two
-            empty ones match any text. So does a template with more than 20 pieces or 2,000 characters, or
-            with the character U+D800. Adjacent holes become one.
+            empty pieces match any text. A template with more than 20 pieces or 2,000 characters, or with
+            the character U+D800, also matches any text. Adjacent holes become one.
 
     Raises:
         ValueError: there are no parts.
@@ -48,7 +48,7 @@ class TextTemplate:
 
     @cached_property
     def joined(self) -> str:
-        """The template in lower case and normalized, as texts are compared, with U+D800 for each hole."""
+        """The template as it is compared with texts: normalized, in lower case, with U+D800 for each hole."""
         return _comparable(_HOLE.join(self.parts))
 
     @cached_property
@@ -56,19 +56,19 @@ class TextTemplate:
         return self.joined.split(_HOLE)
 
     def matches(self, text: str) -> bool:
-        """Whether a text has all the pieces in order, with any text in the holes."""
+        """Whether a text consists of the pieces in order, with any texts in the holes."""
         return _are_in_order(self._pieces, _comparable(text))
 
     def covers(self, other: TextTemplate) -> bool:
         """Whether this template matches every text that another template matches.
 
-        True is always right. False may be wrong.
+        The answer True is always right, but False may be wrong.
         """
         return _are_in_order(self._pieces, other.joined)
 
     @staticmethod
     def beyond(templates: Iterable[TextTemplate], allowed: Iterable[TextTemplate]) -> list[TextTemplate]:
-        """Return the templates that none in `allowed` covers, in linear time for texts without holes."""
+        """Return those of `templates` that no template in `allowed` covers; fast for texts without holes."""
         known = [*allowed]
         exact, open_ones = {one.joined for one in known}, [one for one in known if len(one.parts) > 1]
         left = [one for one in templates if one.joined not in exact]
@@ -88,7 +88,7 @@ class TextTemplate:
         for piece, field, form, conversion in Formatter().parse(text):
             parts[-1] += piece
             if field or form or conversion:
-                raise ValueError("a hole is written {}, and a brace is doubled")
+                raise ValueError("write {} for a hole, and double any other brace, as in {{ and }}")
             if field is not None:
                 parts.append("")
         return cls(tuple(parts))

@@ -31,7 +31,7 @@ def compose(value: Composed) -> Composed:
 
 
 def compose_fields(frozen: object) -> None:
-    """Convert the strings in a frozen data class to NFC; called in `__post_init__`."""
+    """Convert the strings in a frozen data class to NFC; `__post_init__` of the class calls this."""
     for name, value in vars(frozen).items():
         object.__setattr__(frozen, name, compose(value))
 
@@ -50,7 +50,7 @@ def normalize_text(form: Literal["NFC", "NFD"], text: str) -> str:
 
 
 def long_rows(text: str) -> Iterator[tuple[int, int]]:
-    """Yield the start of each letter with more than 30 accents, and the end of these accents."""
+    """Yield the index of each letter with more than 30 accents, and the index after its last accent."""
     if len(text) <= SHORT_TEXT or text.isascii():
         return
     letter = 0  # where the last letter begins

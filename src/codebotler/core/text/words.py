@@ -25,7 +25,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def with_sentence(text: str, sentence: str) -> str:
-    """Add a sentence to a text, after a full stop."""
+    """Add a sentence to a text, after a full stop if the text ends without a punctuation mark."""
     text = text.rstrip()
     stop = "" if not text or text[-1] in ".!?:;…。" else "."
     return f"{text}{stop} {sentence}"

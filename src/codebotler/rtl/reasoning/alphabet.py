@@ -44,7 +44,7 @@ def alphabet(
     rooms: Sequence[str] | None = None,
     moves: Sequence[str] | None = None,
 ) -> list[Event]:
-    """Generate example events, and keep one for each set of patterns that an event matches.
+    """Return example events: one for each set of the `wanted` patterns that an event can match together.
 
     Args:
         wanted: the patterns.

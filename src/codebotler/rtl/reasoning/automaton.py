@@ -70,7 +70,7 @@ class Automaton:
 
     @cached_property
     def distances(self) -> tuple[int | None, ...]:
-        """The minimum number of events from each state to an accepting one, or None if none is reachable."""
+        """For each state, the least number of events to an accepting state; None if there is no way."""
         found: list[int | None] = [0 if accepted else None for accepted in self.accepts]
         distance, border = 0, {s for s, accepted in enumerate(self.accepts) if accepted}
         while border:

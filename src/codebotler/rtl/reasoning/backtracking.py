@@ -33,7 +33,7 @@ class RepeatedText(NamedTuple):
 
 @cache
 def slow_text(pattern: str) -> str | None:
-    """Return the start of a string on which a regex is slow, such as `aaa` for `(a+)+b`, or else None."""
+    """Return the start of a string on which a regex is slow: `aaa` for `(a+)+b`; None if none was found."""
     for find, sizes in ((failing_regex(pattern), SHORT_SIZES), (compile_regex(pattern), LONG_SIZES)):
         for text in texts_to_try(pattern):
             if is_slow(find.findall, text, sizes):
@@ -59,7 +59,7 @@ def is_slow(
 
 @cache
 def texts_to_try(pattern: str) -> list[RepeatedText]:
-    """Return texts on which a regex may be slow, always the same for a regex; none without a repetition."""
+    """Return texts on which a regex may be slow, always the same ones; none if the regex repeats nothing."""
     tree = parse_tree(pattern)
     if "REPEAT" not in str(tree):
         return []

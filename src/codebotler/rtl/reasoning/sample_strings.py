@@ -20,7 +20,7 @@ _MOST_ALIKE = 2
 
 @cache
 def distinct_strings(texts: tuple[TextPattern, ...], *, outer: bool = False) -> tuple[str, ...]:
-    """Generate strings, and return one short string for each set of patterns that a string matches.
+    """Generate strings, and return a short one for each set of patterns that a string can match together.
 
     `outer` allows outer spaces, which options may have but texts of events may not.
     """

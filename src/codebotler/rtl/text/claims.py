@@ -47,7 +47,7 @@ class Number(Matcher):
 
     @cached_property
     def kinds(self) -> tuple[re.Pattern[str], ...]:
-        """The compiled regexes for the thing and the others."""
+        """The compiled regexes: first for the thing, then for the others."""
         return tuple(map(_word, (self.thing, *self.others)))
 
     def __str__(self) -> str:
