@@ -60,7 +60,7 @@ _NO_SCRIPT = "script-src 'none'"  # pages with this policy get no nonce
 
 _NO_CONTROL_CHARACTERS = "there is no such page; addresses cannot contain control characters"
 NO_PAGE = "there is no such page"
-_WRONG = "this token is wrong"
+_WRONG = "this token is wrong; use the printed link or token"
 _OTHER_SITE = (
     "this request came from another site; behind a proxy, use --behind-proxy and keep the Host header"
 )
