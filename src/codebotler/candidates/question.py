@@ -38,7 +38,7 @@ Aspect: TypeAlias = tuple[str, str]
 
 
 class WordLimits(NamedTuple):
-    """How long the description of an option may be."""
+    """The limits for the description of an option."""
 
     parts: int  # the most differences, texts, and rooms of a text
     characters: int  # of a text
@@ -213,7 +213,7 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
 
 
 def describe_differences(samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> list[str]:
-    """Say of each run in one world only what differs from the other runs, such as "ends in kitchen"."""
+    """Return how each run in one world differs from the other runs, such as "ends in kitchen"."""
     seen = [_aspects(behaviour) for behaviour in behaviours]
     keys, said = _telling_first(seen), [behaviour.said for behaviour in behaviours]
     rooms = {room for one in said for other in said for room, _ in one - other}  # where the options differ
