@@ -135,5 +135,5 @@ def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], Comma
 
 
 def options_for(called: Callable[..., object], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those of the `given` options that the function `called` accepts."""
+    """Return the options in `given` that the function `called` accepts, by name."""
     return {name: given[name] for name in signature(called).parameters}

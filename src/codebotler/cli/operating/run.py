@@ -59,9 +59,9 @@ class Request:
         if self.what.endswith(".py") and not self.is_program:
             raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
         if (self.recoveries or self.candidates > 1) and self.is_program and self.past is None:
-            raise UserError("--recover and --candidates need an instruction, but this is a program")
+            raise UserError("--recover and --candidates need an instruction, but the argument is a program")
         if self.what == "-" and not self.yes:
-            raise UserError("the program uses standard input, so approval cannot be read; add --yes")
+            raise UserError("standard input cannot hold both the program and your approval; add --yes")
 
     def order_on(self, console: Console) -> MissionOrder:
         """Convert the request to an order for the console. A program file or standard input is read now."""
@@ -277,7 +277,7 @@ def _ask_whether(past: MissionPast) -> bool:
 
 
 def past_view(past: MissionPast) -> Group:
-    """Show what a mission did and saw before it ended."""
+    """Return what a mission did and saw before it ended, for printing."""
     head = Text.assemble((f"mission {past.mission}", "bold"), f" ended early: {shortened(past.why)}")
     steps = [Text(f"  {step}", "dim") for step in past.steps] or [Text("  no step was finished", "dim")]
     return Group(head, Text("done so far:"), *steps)
