@@ -167,7 +167,7 @@ class Mission:
                 self.note(f"approved by {by}")
 
     def fail(self, reason: str) -> None:
-        """Mark the mission as failed and log why. Raise MissionError if it is running or has ended."""
+        """Mark the mission as failed and log why. Raise MissionError while it is running or after its end."""
         with self._writing:
             if self.state.is_moving:
                 raise MissionError(f"mission {self.id} is {self.state}; stop the mission instead")

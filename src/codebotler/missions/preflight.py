@@ -46,7 +46,7 @@ def resume_robot(robot: Robot, past: MissionPast) -> None:
 def ask_rooms(
     robot: Robot, remark: Callable[[str], None], world: World | None = None
 ) -> tuple[RoomMap | None, str]:
-    """Ask a connected robot for its rooms and its current room. Tell `remark` about likely mistakes.
+    """Ask a connected robot for its rooms and its current room. Report likely mistakes with `remark`.
 
     Returns:
         the rooms, with footprints from `world`, or None if the robot does not list its rooms; and the
@@ -102,7 +102,7 @@ def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
 def expect_enforceable(
     rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None, remark: Callable[[str], None]
 ) -> None:
-    """Raise UserError or NotReadyError if a rule cannot be enforced. Tell `remark` if one can be evaded."""
+    """Raise UserError or NotReadyError if a rule cannot be enforced. Call `remark` if one can be evaded."""
     rooms = () if room_map is None else room_map.goals
     for sentence in (one for rule in rules for one in unknown_rooms_in(rule, rooms)):
         raise UserError(sentence)
@@ -127,7 +127,7 @@ def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) 
 
 
 def limit_rooms(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:
-    """Return `room_map`, or None if it has too many rooms for a check; tell `remark` about that."""
+    """Return `room_map`, or None if it has too many rooms for a check, and say so with `remark`."""
     if room_map is None or len(room_map.rooms) <= MAX_CHECKED_ROOMS:
         return room_map
     remark(

@@ -134,7 +134,7 @@ class Progress:
         return now
 
     def with_failure(self, event: str) -> Progress:
-        """Return the progress after the skill ended without success: with `error`, `cancelled` or `late`."""
+        """Return the progress after the skill ended with `error`, `cancelled` or `late` (after a stop)."""
         recording = _recording(self.skill)
         if recording is not None and recording.is_drive and event != "late":
             return replace(self, room=self.left, is_between=self.is_between or event == "cancelled")

@@ -120,7 +120,7 @@ class SessionView:
 
     @property
     def contract(self) -> Contract | None:
-        """The program's contract, as its check derived it; None if it was not checked."""
+        """The contract that the check derived from the program; None if there is none."""
         return None if self.check is None else self.check.contract
 
     @property
@@ -145,7 +145,7 @@ class SessionView:
 
     @property
     def phase(self) -> Phase:
-        """The session's current work, such as `writing` or `checking`, or the final state of its mission."""
+        """The session's work, such as `writing`, or else its mission's state; "" if there is neither."""
         if self.is_over or self.is_running:
             return "" if self.state is None else self.state
         if self.is_written:
@@ -170,7 +170,7 @@ class SessionView:
 
     @property
     def may_be_approved(self) -> bool:
-        """Whether the program can be approved now."""
+        """Whether the program is checked and can be approved now."""
         return self.state is MissionState.CHECKED and not (self.is_over or self.busy or self.question)
 
     @property

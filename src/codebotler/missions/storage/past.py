@@ -228,7 +228,7 @@ def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> N
     lacks = next((name for name in had if name not in here), None)
     if lacks is not None:
         where = f'ran on another map, with the room "{shortened(lacks)}"'
-        raise UserError(f"mission {mission} {where}; give its --world again, or none if it had none")
+        raise UserError(f"mission {mission} {where}; give the same --world again, or leave it out")
 
 
 def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[LoggedRobot, Event | None]:
@@ -281,7 +281,7 @@ class LoggedRobot(SimulatedRobot):
         """Return None, since a log does not list the objects in a room."""
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Return a skill's logged result and record its event, or raise RobotError if it did not succeed."""
+        """Return a skill's logged result and record its event, or raise RobotError if the skill failed."""
         if self.end["event"] not in DONE_EVENTS:
             raise RobotError(self.end["event"], "the skill failed or was cancelled")
         row, result = self.skills[skill], self.end.get("result")
