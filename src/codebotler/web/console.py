@@ -130,7 +130,7 @@ class Console:
     def begin(self, order: MissionOrder, *, by_agent: bool = False) -> MissionSession:
         """Begin a mission, by default with the first model. Raise MissionError while another mission runs.
 
-        If an agent begins the mission, a notice about an interrupted mission stays, for a person.
+        With `by_agent`, the notice about interrupted missions stays, so that a person still sees it.
         """
         noticed = self.interrupted if by_agent else ()
         session = self._begin(order)
@@ -356,7 +356,7 @@ class Notifier:
                 self._wakes.remove(wake)
 
     async def until(self, is_met: Callable[[], bool], seconds: float | None = None) -> bool:
-        """Wait until a condition is met, for at most `seconds`, and return whether it is met."""
+        """Wait until a condition is met, for at most `seconds` if given. Return whether it is met."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds), aclosing(self.changes()) as changes:
                 async for _ in changes:

@@ -147,7 +147,7 @@ Content = TypeVar("Content")
 
 
 class DrawnBox(Element, Generic[Content]):
-    """An element that calls `draw` with its content, and again only when the content has changed."""
+    """An element that draws its content with `draw`, but only when the content has changed."""
 
     def __init__(self, kind: str, draw: Callable[[Content], None], tag: str = "div") -> None:
         super().__init__(tag)

@@ -54,7 +54,7 @@ class ContinueButton(Button):
 
 
 def has_rest(view: SessionView) -> bool:
-    """Return whether a mission ended early, and it or the mission that it continues had begun to run."""
+    """Return whether a mission ended early after it, or a mission that it continues, had begun to run."""
     has_past = view.progress.has_begun or view.past is not None
     is_early = view.state in EARLY_ENDS or view.state is None  # without a state, the robot was busy
     return view.is_over and is_early and has_past

@@ -91,7 +91,7 @@ class Access:
         return cls(of_operators, face or new_token(), agent or new_token(), unguessable)
 
     def of_token(self, token: str, address: str) -> Role | None:
-        """Return a token's role, or None if it is invalid. Raise TooManyTriesError at the address's limit."""
+        """Return a token's role, or None. Raise TooManyTriesError after many invalid ones from `address`."""
         role = self._of(token, lambda known: known)
         if role in self.unguessable:
             return role
@@ -116,7 +116,7 @@ class Access:
 
     @property
     def path(self) -> str:
-        """A secret path for the page and its cookie, which servers on other ports would otherwise receive."""
+        """The secret path of the page, so that servers on other ports do not receive the page's cookies."""
         return f"/{self._cookie_value('path')[:SECRET_BYTES]}"
 
     def _cookie_value(self, token: str) -> str:
@@ -196,6 +196,6 @@ class PageAddress:
 
     @property
     def hosts(self) -> frozenset[str]:
-        """The host names that requests may have, without ports."""
+        """The host names that requests may name, in lower case and without ports."""
         named = {name.lower() for name in (self.host, *self.names)} | {one.name for one in self.proxies}
         return LOCAL_HOST_NAMES | named | (set() if self.is_loopback else {socket.gethostname().lower()})

@@ -104,7 +104,7 @@ def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
 
 
 def addresses_by_host(addresses: Iterable[OuterAddress]) -> Mapping[str, OuterAddress]:
-    """Return addresses by Host header, with and without the default port, which some clients add."""
+    """Return addresses by Host header: with and without the default port, which some clients add."""
     found: dict[str, OuterAddress] = {}
     for address in addresses:
         found[address.host] = address
