@@ -61,7 +61,7 @@ class CandidateCluster:
         return self.programs[0]
 
     def extended(self, samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> CandidateCluster:
-        """Return the cluster with runs of its first program in further worlds."""
+        """Return the cluster with added runs of its first program, in further worlds."""
         runs, all_behaviours = (*self.samples, *samples), (*self.behaviours, *behaviours)
         numbered = tuple(replace(sample, number=number) for number, sample in enumerate(runs))
         return replace(self, samples=numbered, behaviours=all_behaviours)

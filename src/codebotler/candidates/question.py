@@ -102,7 +102,7 @@ class ClarifyingQuestion:
 
     @property
     def supposition(self) -> str:
-        """The facts of the imagined world in a phrase for a sentence; empty if there are none."""
+        """The facts of the world, as in ", supposing that Anne is in the lab"; empty if there are none."""
         return f", supposing that {listed([*map(shortened, self.facts)])}" if self.facts else ""
 
     @property

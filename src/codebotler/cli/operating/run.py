@@ -111,7 +111,7 @@ def run(console: Console, request: Request) -> int:
                 approval = PriorApproval.of(session.view)
             order = console.rest_of(past)
             print_rich(past_view(past))
-            note(f"recovering: asking {order.model} for the rest")
+            note(f"recovering: asking {order.model} for the rest of the mission")
             request = replace(request, despite_problems=False)  # accepted for the first program only
         raise AssertionError("the last mission has no rest")
 
@@ -180,7 +180,7 @@ def _is_approved(
         note(f"not run because of problems{anyway}")
         return False
     if is_covered:
-        note("the rest stays within what was approved before")
+        note("the rest of the mission stays within what was approved before")
     elif not request.yes and not confirm(f"run the program on the robot {robot.name}?"):
         session.stop("the person at the terminal")
         note("not run" if view.past else "not run; the robot has not moved")
@@ -217,7 +217,7 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
         session.stop_soon(SIGNALS[signal.Signals(number)])
         got.append(number)
         if len(got) > 1:
-            note(f"\nasked the robot to stop; it has {STOP_GRACE_SECONDS:g} s to confirm")
+            note(f"\nasked the robot to stop; the robot has {STOP_GRACE_SECONDS:g} s to confirm")
 
     outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     obeyed = [number for number in SIGNALS if not (outlives and number is signal.SIGHUP)]

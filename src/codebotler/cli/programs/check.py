@@ -140,6 +140,6 @@ def write_contract(file: Path | None, contract: Contract | None) -> None:
     if file is None:
         return
     if contract is None:
-        raise UserError("the program has no contract, since it cannot run")
+        raise UserError("no contract could be derived from the program; correct its problems first")
     write_new(file, contract_yaml(contract))
     note(f"wrote {file}")

@@ -31,7 +31,7 @@ def find_replayed_files(paths: Sequence[Path]) -> list[Path]:
     found: list[Path] = []
     for path in paths:
         if not path.exists():
-            raise UserError("there is no such file", file=path)
+            raise UserError("there is no such file or folder; correct the path", file=path)
         parts = sorted(path.iterdir()) if path.is_dir() and not _is_replayed(path) else [path]
         files = list(filter(_is_replayed, parts))
         if not files:
