@@ -17,7 +17,7 @@ def test_pages_that_refuse(server: PageServer, open_page: OpenPage, screen: Scre
     expect(page.locator("p")).to_contain_text("open the printed link")
     expect_no_grave_fault(page)
     page.goto(f"{server.link}x")
-    expect(page.locator("p")).to_have_text("this token is wrong")
+    expect(page.locator("p")).to_have_text("this token is wrong; use the printed link or token")
     expect_no_grave_fault(page)
     page.goto(server.link)
     page.goto(f"{server.inside}/nothing")

@@ -64,25 +64,25 @@ class OpenQuestion(NamedTuple):
 
 
 async def find_question(ctx: AgentContext) -> OpenQuestion:
-    """Return the question of the current mission. Raise ToolError if it waits for no choice."""
+    """Return the open question of the current mission. Raise ToolError if no question is open."""
     session = gatekeeper_of(ctx).console.session
     view = None if session is None else session.view
     if session is None or view is None or view.question is None or not view.waits_for_answer:
-        raise ToolError("no mission waits for such an answer")
+        raise ToolError("no mission waits for a choice between behaviours; call follow_mission")
     return OpenQuestion(session, view.question)
 
 
 def ask_which_behaviour(
     question: Annotated[OpenQuestion, Resolve(find_question)], ctx: AgentContext
 ) -> Elicit[Choice] | NotAsked:
-    """Open a dialog of the client in which its person chooses a behaviour, if the client has dialogs."""
+    """Have the client ask its person for a behaviour, or return NotAsked if the client has no dialogs."""
     if not gatekeeper_of(ctx).asks_client or not _has_dialogs(ctx):
         return NotAsked()
     return Elicit(f"Mission {question.session.view.id}: {which_question(question.asked)}", Choice)
 
 
 async def read_last_past(ctx: AgentContext) -> MissionPast:
-    """Return what the last mission did and saw, or, while a rest is current, what the rest continues."""
+    """Return what the last mission did and saw. During a continuation, return what that continues."""
     gatekeeper, console = gatekeeper_of(ctx), gatekeeper_of(ctx).console
     with as_tool_errors():
         if console.view.past is not None and not console.view.is_over:
@@ -93,7 +93,7 @@ async def read_last_past(ctx: AgentContext) -> MissionPast:
 def ask_whether(
     past: Annotated[MissionPast, Resolve(read_last_past)], ctx: AgentContext
 ) -> Elicit[StepWord] | NotAsked:
-    """Open a dialog of the client on whether a step happened, if the log does not say so."""
+    """Have the client ask its person whether the unsure step happened, or return NotAsked."""
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NotAsked()
@@ -113,7 +113,7 @@ class ProposedProgram(NamedTuple):
 
 
 async def find_proposed(digest: str, ctx: AgentContext) -> ProposedProgram:
-    """Return the current mission. Raise ToolError if its program has another digest."""
+    """Return the current mission and its problems. Raise ToolError if its program has another digest."""
     with as_tool_errors():
         session = gatekeeper_of(ctx).find_session(digest)
     view = session.view
@@ -123,7 +123,7 @@ async def find_proposed(digest: str, ctx: AgentContext) -> ProposedProgram:
 def ask_person(
     proposed: Annotated[ProposedProgram, Resolve(find_proposed)], ctx: AgentContext
 ) -> Elicit[Consent] | NotAsked:
-    """Open a dialog of the client to approve a program, if that is needed and the client has dialogs."""
+    """Have the client ask its person for approval, or return NotAsked if that is needless or impossible."""
     gatekeeper, session = gatekeeper_of(ctx), proposed.session
     view = session.view
     may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)

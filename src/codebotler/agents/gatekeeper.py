@@ -46,7 +46,7 @@ MAX_ASKED_CHARACTERS = 4_000
 
 @dataclass
 class Gatekeeper:
-    """Checks what agents ask for, and passes it to the console of the page. No method approves a mission.
+    """Checks the requests of agents, and passes them to the page's console. No method approves a mission.
 
     Args:
         console: the robot and its current mission.
@@ -71,7 +71,7 @@ class Gatekeeper:
         view = SessionView() if before is None else before.view
         is_own = before is None or (before is self._session and not before.is_changed_by_person)
         if not (is_own or view.is_over):
-            raise MissionError("a person is working on a mission of their own; wait until it is over")
+            raise MissionError("a person is working on another mission; wait until that mission is over")
         if len(order.program) > MAX_PROGRAM_LENGTH:  # it would have no contract
             raise UserError(f"the program has more than {MAX_PROGRAM_LENGTH:,} characters; shorten it")
         if not order.has_program and not self.writes:
@@ -83,7 +83,7 @@ class Gatekeeper:
     def propose_steps(
         self, purpose: str, bounds: Mapping[str, Any], author: str
     ) -> tuple[MissionSession, Steps]:
-        """Propose a mission in which the agent calls skills one at a time. `bounds` is its contract."""
+        """Propose a step-by-step mission. `bounds` is its contract as data, and `author` the agent's name."""
         if self.console.view.is_running:  # before the bounds are read, which takes time
             raise MissionError("a mission is running; wait until it is over, or stop it")
         if len(json.dumps(bounds)) > MAX_CONTRACT_CHARACTERS:
@@ -124,7 +124,7 @@ class Gatekeeper:
         return is_running and steps is not None and view.program == steps.program
 
     def approves_alone(self, session: MissionSession) -> bool:
-        """Whether a mission needs no person, because the contract given at the start allows all it may do.
+        """Whether a mission needs no person's approval, because the contract given at the start allows it.
 
         If a person has changed the program, switched off a rule or pressed STOP, a person must approve it.
         """
@@ -136,7 +136,7 @@ class Gatekeeper:
         return is_agents and is_within and view.may_be_approved and not view.problems
 
     def contract_text(self, contract: Contract | None) -> str:
-        """Describe all that a program can do at most, or return "" if this is unknown."""
+        """Return sentences that say what a program can do at most, or "" if there is no contract."""
         if contract is None:
             return ""
         whole = partial(brief_part, most=MAX_PROGRAM_LENGTH)
@@ -176,13 +176,13 @@ class Gatekeeper:
         return self.check(made.reply.program)
 
     async def alone(self, kind: str, work: Callable[[], _Made]) -> _Made:
-        """Do slow work on a new thread. Raise MissionError if work of this `kind` is under way already.
+        """Return the result of slow work on a new thread. Raise MissionError if work of this `kind` goes on.
 
         The few threads of the SDK and of the event loop stay free for people, and a person's check never
         waits for many checks of agents.
         """
         if kind in self._under_way:
-            raise MissionError(f"another {kind} is under way; try again when it is over")
+            raise MissionError(f"another {kind} is under way; try again when that is over")
         self._under_way.add(kind)
         made = Future[_Made]()
         made.set_running_or_notify_cancel()
@@ -250,7 +250,7 @@ class Gatekeeper:
         if not view.may_be_approved:
             return view.error or "The program is not ready: call follow_mission, or propose another one."
         if not view.can_run:
-            return "This program cannot run. Mend it, and propose it again."
+            return "This program has a syntax error. Correct the program, and propose it again."
         why = "After a STOP or the loss of the robot, a" if self.console.is_held else "A"
         where = f"on the open page, or by the link to {self.page} that was printed at the start"
         if self.may_ask_client(view):

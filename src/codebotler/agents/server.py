@@ -216,7 +216,7 @@ def take_streams() -> Streams:
     """
     kind = os.fstat(0).st_mode
     if not (stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)):
-        raise UserError("an MCP client starts this command and talks to it; --http serves agents over HTTP")
+        raise UserError("only an MCP client can start this command; use --http to serve agents over HTTP")
     # uvloop closes the descriptors as well as the files, and in between another thread may reuse the numbers.
     received = os.fdopen(os.dup(0), "rb", buffering=0, closefd=False)
     streams = Streams(received, os.fdopen(os.dup(1), "wb", closefd=False))

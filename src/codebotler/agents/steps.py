@@ -45,7 +45,7 @@ _Call: TypeAlias = tuple[Skill, list[Argument], "Future[SkillOutcome]"]
 
 @dataclass
 class Steps:
-    """A queue of an agent's calls of skills. The thread of the mission takes them one at a time."""
+    """A step-by-step mission. An agent queues calls of skills, and the mission's thread executes them."""
 
     purpose: str  # in the agent's words
     contract: Contract  # what it may call
@@ -65,7 +65,7 @@ class Steps:
         return _PROGRAM.format(mark=self.mark, purpose=purpose, contract=lines)
 
     def call(self, name: str, arguments: Mapping[str, object]) -> Future[SkillOutcome]:
-        """Queue a call of a skill, and return its future outcome. Raise UserError if the call is wrong."""
+        """Queue a call and return its future outcome. Raise UserError if the call is wrong or not allowed."""
         if name not in (self.contract.skills.keys() | TELLING_SKILLS) & {*self.skills}:
             raise UserError(f"this mission may call only {listed(list(self.contract.skills))}")
         call = self.skills[name], named_arguments(self.skills[name], arguments), Future[SkillOutcome]()
@@ -76,17 +76,17 @@ class Steps:
         return call[2]
 
     def end(self) -> None:
-        """End the mission after the calls so far."""
+        """End the mission after all calls in the queue."""
         self._calls.put(None)
 
     def drive(self, live: LiveRobot) -> Outcome:
-        """Execute the calls on the mission's thread until `end`, or until the mission is stopped."""
+        """Execute queued calls on the mission's thread until `end` or a stop, and return the outcome."""
         ledger, call = Ledger(live), None
         try:
             while ledger.limit is None and (call := self._next(live)) is not None:
                 call[2].set_result(_perform(ledger, *call[:2]))
                 if ledger.calls >= MAX_STEPS:
-                    ledger.limit = f"the mission has made {MAX_STEPS:,} calls; begin another one"
+                    ledger.limit = f"the mission has made {MAX_STEPS:,} calls; begin another mission"
             return ledger.outcome_at_end({"end": "finished"})
         finally:
             self._close(call)
@@ -105,7 +105,7 @@ class Steps:
             self._is_over = True
             while call is not None or not self._calls.empty():
                 if call is not None and not call[2].done():
-                    call[2].set_exception(MissionError("the mission ended before the end of this call"))
+                    call[2].set_exception(MissionError("the mission ended before this call was finished"))
                 call = None if self._calls.empty() else self._calls.get()
 
 

@@ -69,7 +69,7 @@ _Seconds = Annotated[
 def read_robot(ctx: AgentContext) -> RobotReport:
     """Read the robot's rooms, its skills, the house rules, and how to write a program for it.
 
-    Call this first. It changes nothing.
+    Call this first. This changes nothing.
     """
     return gatekeeper_of(ctx).report_robot()
 
@@ -77,7 +77,7 @@ def read_robot(ctx: AgentContext) -> RobotReport:
 async def check_program(program: _Program, ctx: AgentContext) -> CheckReport:
     """Check a program in imagined worlds without a robot: its problems, and what the robot would do.
 
-    It changes nothing and needs no approval. Mend all problems before you propose the program.
+    This changes nothing and needs no approval. Correct all problems before you propose the program.
     """
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors():
@@ -85,7 +85,7 @@ async def check_program(program: _Program, ctx: AgentContext) -> CheckReport:
 
 
 async def write_program(instruction: _Instruction, ctx: AgentContext) -> CheckReport:
-    """Have CodeBotler's own language model write a program, and check it. It runs nothing.
+    """Have CodeBotler's own language model write a program, and check it. Nothing is run.
 
     You may also write the program yourself; read_robot explains how.
     """
@@ -132,7 +132,7 @@ async def choose_behaviour(
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors():
         if not isinstance(answer, AcceptedElicitation) or isinstance(answer.data, NotAsked):
-            raise MissionError(f"a person must choose on the page {gatekeeper.page}")
+            raise MissionError(f"a person must choose a behaviour on the page {gatekeeper.page}")
         given = answer.data
         question.session.answer(question.asked, question.asked.parse(given.answer), given.more)
         with gatekeeper.waiting():
@@ -213,9 +213,9 @@ async def run_mission(
 
 
 async def follow_mission(ctx: AgentContext, after: _After = 0, seconds: _Seconds = 45) -> MissionReport:
-    """Wait until the current mission is over, at most some seconds, and read what has happened.
+    """Wait until the current mission is over, but at most `seconds`, and read what has happened.
 
-    It reports progress while it waits. Cancelling this call stops nothing.
+    This reports progress while it waits. Cancelling this call stops nothing.
     """
     gatekeeper = gatekeeper_of(ctx)
     session = gatekeeper.console.session
@@ -254,9 +254,9 @@ async def end_steps(steps: _Key, ctx: AgentContext) -> MissionReport:
 
 
 async def stop(ctx: AgentContext) -> MissionReport:
-    """Stop the robot and the current mission at once. It needs no approval and always works.
+    """Stop the robot and the current mission at once. This needs no approval and always works.
 
-    Call it whenever anything is wrong, also while another call is waiting.
+    Call this whenever anything is wrong, even while another call is waiting.
     """
     gatekeeper = gatekeeper_of(ctx)
     session = gatekeeper.console.session
@@ -295,7 +295,7 @@ def _take_answer(
         case AcceptedElicitation(data=Consent(approve=True)):
             if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
                 if view.problems != proposed.problems:
-                    raise MissionError("the check has found something else meanwhile; ask again")
+                    raise MissionError("the check now has other problems; call run_mission again")
                 session.approve(
                     digest,
                     despite_problems=bool(view.problems),

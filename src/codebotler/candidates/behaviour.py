@@ -1,4 +1,4 @@
-"""Reduce a run to what a person would notice, whatever its wording and the order of its visits."""
+"""Reduce a run to what a person would notice. Its wording and the order of its visits do not count."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def behaviour_of(
 
 
 def statements(trace: Trace) -> Iterator[tuple[str, str]]:
-    """Yield each statement with its room. A statement joins all that is said before a change of room."""
+    """Yield the room and the text of each statement. All that is said before a drive is one statement."""
     spoken = (one for one in trace if one.kind in {GOTO, SAY} and not _stays(one))
     for is_drive, some in groupby(spoken, key=lambda one: one.kind == GOTO):
         if not is_drive:
@@ -111,8 +111,8 @@ def wording(trace: Trace) -> frozenset[str]:
 def count_conflicts(traces: Iterable[Trace], homes: Iterable[tuple[str, str]] = ()) -> int:
     """Count contradictions between runs in the same world.
 
-    A run may meet somebody or something that another one misses, a person may be in several rooms, and a
-    question may have several answers. `homes` are people and their rooms that no trace names.
+    For example, one run meets a person whom another misses, a person is in several rooms, or a question has
+    several answers. `homes` are further people, each with a room.
     """
     seen = {one for trace in traces for one in _encounters(trace)}
     people = {(one.name, one.room) for one in seen if one.is_there and one.is_person} | {*homes}
@@ -124,7 +124,7 @@ def count_conflicts(traces: Iterable[Trace], homes: Iterable[tuple[str, str]] = 
 
 
 def people_sought(traces: Iterable[Trace]) -> set[tuple[str, str]]:
-    """Return the names of people that runs looked for or asked, each with the room."""
+    """Return the people that runs looked for or asked, as pairs of a name and a room."""
     found = (one for trace in traces for one in _encounters(trace))
     return {(one.name, one.room) for one in found if one.is_person and one.name != SOMEBODY}
 

@@ -66,7 +66,7 @@ class CandidateCluster:
         return sum(sample.in_vain for sample in self.samples)
 
     def extended(self, samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> CandidateCluster:
-        """Return the cluster with runs of its first program in further worlds."""
+        """Return the cluster with added runs of its first program, in further worlds."""
         runs, all_behaviours = (*self.samples, *samples), (*self.behaviours, *behaviours)
         numbered = tuple(replace(sample, number=number) for number, sample in enumerate(runs))
         return replace(self, samples=numbered, behaviours=all_behaviours)
@@ -152,7 +152,7 @@ def cluster_candidates(
         together.setdefault(behaviours[number], []).append(number)
     if not together:
         again = counted(len(programs) - rejected, "program")
-        raise UserError(f"{again} would do again what was not meant; give the instruction in other words")
+        raise UserError(f"{again} would again do what was not meant; give the instruction in other words")
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     people = frozenset(map(normalized, rooms.people))
     conflicts = [*map(bool, conflicts_in_worlds(clusters, people).values())]
@@ -232,7 +232,7 @@ def run_in_shared_worlds(
 
 
 def conflicts_in_worlds(clusters: Sequence[CandidateCluster], people: Container[str] = ()) -> dict[int, int]:
-    """Count the contradictions in each world in which the clusters differ; see `count_conflicts`."""
+    """Count the contradictions in each world where the clusters differ. The keys are numbers of worlds."""
     conflicts: dict[int, int] = {}
     for number in range(len(clusters[0].samples)):
         if len({one.behaviours[number] for one in clusters}) > 1:

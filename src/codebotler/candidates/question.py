@@ -38,7 +38,7 @@ Aspect: TypeAlias = tuple[str, str]
 
 
 class WordLimits(NamedTuple):
-    """How long the description of an option may be."""
+    """The limits for the description of an option."""
 
     parts: int  # the most differences, texts, and rooms of a text
     characters: int  # of a text
@@ -97,7 +97,7 @@ class ClarifyingQuestion:
 
     @property
     def supposition(self) -> str:
-        """The facts of the imagined world in a phrase for a sentence; empty if there are none."""
+        """The facts of the world, as in ", supposing that Anne is in the lab"; empty if there are none."""
         return f", supposing that {listed([*map(shortened, self.facts)])}" if self.facts else ""
 
     @property
@@ -216,7 +216,7 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
 
 
 def describe_differences(samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> list[str]:
-    """Say of each run in one world only what differs from the other runs, such as "ends in kitchen"."""
+    """Return how each run in one world differs from the other runs, such as "ends in kitchen"."""
     seen = [_aspects(behaviour) for behaviour in behaviours]
     keys, said = _telling_first(seen), [behaviour.said for behaviour in behaviours]
     rooms = {room for one in said for other in said for room, _ in one - other}  # where the options differ

@@ -120,7 +120,7 @@ def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
 
 
 def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], CommandT]:
-    """Return a decorator that gives a command with `**shared` the options of the function `called`, too."""
+    """Return a decorator that adds the options of the function `called` to a command with `**shared`."""
 
     def extended(command: CommandT) -> CommandT:
         inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
@@ -135,5 +135,5 @@ def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], Comma
 
 
 def options_for(called: Callable[..., object], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those of the `given` options that the function `called` accepts."""
+    """Return the options in `given` that the function `called` accepts, by name."""
     return {name: given[name] for name in signature(called).parameters}

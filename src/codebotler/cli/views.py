@@ -78,7 +78,7 @@ def _time_text(line: LogLine) -> str:
 
 
 def ending_view(ended: SessionView) -> Group:
-    """Show how a mission ended, and the command that shows it again, on a line that is never wrapped."""
+    """Return how a mission ended, and the command that shows it again, on a line that is never wrapped."""
     state = ended.state
     assert state is not None, "the mission has begun"
     text = Text.assemble((state, STATE_STYLES.get(state, "bold")), _why(ended))
@@ -89,7 +89,7 @@ def ending_view(ended: SessionView) -> Group:
 
 
 def continue_view(ended: SessionView) -> Text:
-    """Show the command that does the rest of a mission, on a line that is never wrapped."""
+    """Return the command that does the rest of a mission, on a line that is never wrapped."""
     options = "add --world, --robot and --model as you gave them now"
     command = f"`codebotler continue {ended.id}` does the rest; {options}"
     return Text(command, "dim", no_wrap=True, overflow="ignore")
@@ -103,7 +103,7 @@ def _why(ended: MissionSummary | SessionView) -> str:
 
 
 def list_view(summaries: Sequence[MissionSummary]) -> RenderableType:
-    """Show all missions in a table with one line each."""
+    """Return a table of missions with one line each, or a sentence if there are none."""
     if not summaries:
         return Text("there are no missions yet", "dim")
     table = grid("left", "left", "left", "left")
@@ -127,7 +127,7 @@ def list_view(summaries: Sequence[MissionSummary]) -> RenderableType:
 def mission_view(
     summary: MissionSummary, events: Sequence[LogLine], rest: MissionSummary | None = None
 ) -> RenderableType:
-    """Show a mission with its program and events, and how the mission that continued it ended."""
+    """Return a mission's program, events and end, and the end of the mission that continued it, if any."""
     head = Text.assemble((f"mission {summary.id}", "bold"), f" on the robot {summary.robot}")
     if summary.instruction:
         head.append(f"\n{shortened(summary.instruction)}")
@@ -149,13 +149,13 @@ def mission_view(
 
 
 def source_view(program: str) -> Group:
-    """Show a program without wrapping its lines, followed by an empty line."""
+    """Return a program for printing: its lines are never wrapped, and an empty line follows."""
     lines = [f"    {visible(text.expandtabs(4))}\n" for text in program.splitlines()]
     return Group(Text("".join(lines), no_wrap=True, overflow="ignore"))
 
 
 def models_view(models: Sequence[UsableModel], chosen: ChosenModel) -> Group:
-    """Show the usable models with the options that select them, and the default model."""
+    """Return a table of the usable models with the options that select them, and the default model."""
     table = grid("left", "left")
     for model in models:
         table.add_row(Text(model.options, "bold"), Text(model.why, "dim"))
@@ -166,7 +166,7 @@ def models_view(models: Sequence[UsableModel], chosen: ChosenModel) -> Group:
 
 
 def robots_view(kinds: Sequence[Readiness]) -> Table:
-    """Show which kinds of robots work on this machine, and what is missing for the others."""
+    """Return a table of robots: which kinds work on this machine, and what is missing for the others."""
     table = grid("left", "left", "left")
     for kind in kinds:
         works = Text("works", "green") if kind.works else Text("unavailable", "red")

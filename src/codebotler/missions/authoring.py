@@ -17,7 +17,7 @@ from codebotler.robots.base import Robot
 
 
 class ModelAuthor:
-    """Requests programs from a model, one at a time. Any thread can cancel the request."""
+    """Requests programs for a mission from the model `name`. Any thread can cancel the requests."""
 
     def __init__(self, open_model: Callable[[str], Model], name: str) -> None:
         self._open_model, self._name = open_model, name
@@ -27,10 +27,10 @@ class ModelAuthor:
         self._is_cancelled = False
 
     def write(self, prompt: Prompt, count: int, on_text: TextListener) -> tuple[str, Sequence[Attempt]]:
-        """Return the model's name and its replies. Raise CancelledError after `cancel`.
+        """Ask the model, and return its name and its replies. Raise `asyncio.CancelledError` after `cancel`.
 
         Args:
-            prompt: the request.
+            prompt: the prompt to send.
             count: how many replies to request.
             on_text: receives the reply as it arrives, if `count` is 1.
         """
@@ -66,7 +66,7 @@ class ModelAuthor:
 
 
 def prompt_of(view: SessionView, robot: Robot, *, repair: bool) -> Prompt:
-    """Return the prompt for a mission's instruction. A repair prompt also says what was wrong."""
+    """Return the prompt for a mission. With `repair`, it also says what was wrong with the last reply."""
     past, room_map = view.past, view.room_map
     prompt = prompt_for(
         view.instruction,

@@ -22,9 +22,9 @@ def examine_draft(
     Args:
         program: the program.
         view: the view of the session.
-        order: the order. If its `drive` replaces this program, its contract replaces the program's.
+        order: the order. If its `drive` runs in place of this program, its contract applies instead.
         robot: the connected robot.
-        is_wanted: whether the result is still wanted, or else UnwantedCheckError is raised.
+        is_wanted: says whether the result is still needed. If not, UnwantedCheckError is raised.
     """
     rules, skills = view.rules_in_force, robot.skills
     found = check(

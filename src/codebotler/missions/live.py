@@ -42,8 +42,8 @@ class StoppedError(Exception):
 class LiveRobot:
     """Executes the skills that a program calls on a connected robot, real or simulated.
 
-    `Worker.run_live` runs the program. The program's clock starts at `clock_starts`, by default the local
-    time, because programs may tell people the time. Breaking a rule presses `button`.
+    `Worker.run_live` runs the program. `place` is the robot's current room, or "". The program's clock starts
+    at `clock_starts`, by default the local time. Breaking a rule of `guard` presses `button`.
     """
 
     is_live = True
@@ -94,7 +94,7 @@ class LiveRobot:
         self._button.cancel_robot()
 
     def sleep_until(self, now: float) -> None:
-        """Wait until a time on the robot's clock, or raise StoppedError if the mission is stopped."""
+        """Wait until `now` seconds after the program's first skill, or raise StoppedError after a stop."""
         self.check_end()
         seconds = max(0.0, now - self.now)
         at = {} if self.line is None else {"line": self.line}
@@ -104,7 +104,10 @@ class LiveRobot:
         self.check_end()
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill. Raise RobotError, StoppedError, RobotLostError, or OSError if logging fails."""
+        """Execute a skill and return its result. Raise RobotError if the skill fails or a rule refuses it.
+
+        StoppedError, RobotLostError, and OSError (logging failed) end the program.
+        """
         self.check_end()
         try:
             return self._execute(self.skills[skill], arguments)
@@ -225,7 +228,7 @@ class LiveRobot:
             return
         if at is None:
             self._fault = RobotLostError(
-                "it stopped reporting its position during a drive, but a rule needs the position"
+                "the robot stopped reporting its position during a drive, but a rule needs the position"
             )
             self.stop()
             return
@@ -255,7 +258,7 @@ class LiveRobot:
         self.check_end()
 
     def report_unkept(self) -> str:
-        """Log a rule that is broken if the mission ends now, and return the message, or "" if all hold."""
+        """If ending now breaks a rule, log this and return a sentence that says so; otherwise return ""."""
         broken = None if self._guard is None else self._guard.at_end()
         if broken is None:
             return ""
@@ -332,7 +335,7 @@ class LiveRobot:
         return check_answer(skill, self.robot.perform(skill.name, given, on_feedback))
 
     def check_end(self) -> None:
-        """Raise an error if the program must end. The first call starts the program's clock."""
+        """Raise StoppedError or another error if the program must end. The first call starts the clock."""
         if self._began is None:
             self._began = self.robot.clock.now
             watch = getattr(self.robot, "watch", None)  # an optional method

@@ -64,21 +64,21 @@ EventListener: TypeAlias = Callable[[LogLine], None]
 """A function that receives each logged event. Calls may come from any thread, but never overlap."""
 
 Driver: TypeAlias = Callable[[LiveRobot], Outcome]
-"""A function that calls the robot's skills in place of a program, on the mission's thread."""
+"""A function that calls skills in place of a program, on the mission's thread, and returns the outcome."""
 
 
 class Mission:
-    """A mission, used as a context manager. Leaving the block ends the mission.
+    """A mission with its folder and log, used as a context manager. Leaving the block ends the mission.
 
     Args:
         home: the folder that contains the `missions` folder.
         robot: the kind of robot, such as `simulated`.
         instruction: the instruction in plain words, or "" if there is none.
-        on_event: a function to call with each event.
+        on_event: a function that receives each logged event.
         stop_button: the button that stops the mission and its robot, by default a new one.
 
     Raises:
-        OSError: the folder is not writable.
+        OSError: the folder of the mission cannot be written.
     """
 
     def __init__(
@@ -138,7 +138,7 @@ class Mission:
         return self.summary.has_ended
 
     def draft(self, program: str, model: str = "") -> None:
-        """Set or replace the program, written by `model` or a person. Raise MissionError once approved."""
+        """Set the program and the `model` that wrote it, if any. Raise MissionError after an approval."""
         with self._writing:
             self._step(
                 MissionState.DRAFTING, "take another program", program=program, model=model, problems=()
@@ -146,16 +146,16 @@ class Mission:
             self._has_program = True
 
     def check(self, problems: Sequence[str]) -> None:
-        """Record the problems that a check found, or raise MissionError if there is no program to check."""
+        """Record the problems that a program check found. Raise MissionError if there is no program."""
         with self._writing:
             if not self._has_program:
                 raise MissionError(f"mission {self.id} has no program to check")
             self._step(MissionState.CHECKED, "be checked", problems=tuple(problems))
 
     def approve(self, *, despite_problems: bool = False, by: str = "") -> None:
-        """Approve the program, or raise MissionError if it is unchecked or has problems not yet accepted.
+        """Approve the program. Raise MissionError if it is unchecked, or has problems that are not accepted.
 
-        `by` is the source of the approval for the log, if it is not the page or the terminal.
+        `by` says in the log who approved, or is "" if the approval comes from the page or the terminal.
         """
         with self._writing:
             if self.state is MissionState.CHECKED and self.summary.problems and not despite_problems:
@@ -167,14 +167,14 @@ class Mission:
                 self.note(f"approved by {by}")
 
     def fail(self, reason: str) -> None:
-        """Mark the mission as failed, or raise MissionError if it is running or has ended."""
+        """Mark the mission as failed and log why. Raise MissionError while it is running or after its end."""
         with self._writing:
             if self.state.is_moving:
-                raise MissionError(f"mission {self.id} is {self.state}; stop it instead")
+                raise MissionError(f"mission {self.id} is {self.state}; stop the mission instead")
             self._step(MissionState.FAILED, "fail", reason=reason)
 
     def extend_instruction(self, sentence: str) -> None:
-        """Add a person's sentence to the instruction."""
+        """Add a person's sentence to the instruction and to the log."""
         with self._writing:
             self.note(f"a person added to the instruction: {visible(sentence)}")
             self.summary.instruction = with_sentence(self.summary.instruction, sentence)
@@ -184,7 +184,7 @@ class Mission:
         self._write("log", text=text)
 
     def show_map(self, world: World) -> None:
-        """Add the map of the rooms to the log."""
+        """Add the rooms of a world to the log, as a `map` event."""
         self._write("map", **map_data(world))
 
     def stop(self, by: str = "somebody") -> None:
@@ -194,7 +194,7 @@ class Mission:
             by: the source of the stop for the log, such as `Ctrl-C`.
 
         Raises:
-            MissionError: the mission has ended.
+            MissionError: the mission had already ended, so there is nothing to stop.
         """
         had_ended = self.has_ended
         self.stop_button.press(by)
@@ -202,7 +202,7 @@ class Mission:
             raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
 
     def continue_from(self, past: MissionPast) -> None:
-        """Log the steps of the earlier mission that this mission continues, before this one runs."""
+        """Record, before this mission runs, that it continues an earlier one, and log the earlier steps."""
         self.summary.continues = past.mission
         self._write("past", **past.data())
         if past.testimony:
@@ -226,9 +226,9 @@ class Mission:
             reserved: the reservation of the robot.
             place: the robot's current room, or "" if unknown.
             rules: the house rules. Breaking one of them stops the mission.
-            room_map: the rooms that the robot knows.
-            contracts: what the program may do. A call that one of them does not allow stops the mission.
-            drive: calls the skills in place of the program.
+            room_map: the rooms that the robot knows, or None if it does not list them.
+            contracts: what the program may do. A call that goes beyond any of them stops the mission.
+            drive: a function that calls the skills in place of the program.
 
         Raises:
             MissionError: the program is not approved.

@@ -33,12 +33,12 @@ MAX_CHECKED_ROOMS = 1_000
 
 
 def is_resumable(robot: Robot) -> bool:
-    """Whether a robot can be put where an earlier mission left it. Only simulated robots can."""
+    """Whether a robot can take over the final state of an earlier mission. Only simulated robots can."""
     return hasattr(robot, "resume")  # an optional method
 
 
 def resume_robot(robot: Robot, past: MissionPast) -> None:
-    """Put a connected robot where the earlier mission `past` left it, if the robot is simulated."""
+    """Put a simulated robot into the final state of the earlier mission `past`. Leave other robots alone."""
     if is_resumable(robot):
         robot.resume(past.trace)  # type: ignore[attr-defined]  # as was just found
 
@@ -46,7 +46,7 @@ def resume_robot(robot: Robot, past: MissionPast) -> None:
 def ask_rooms(
     robot: Robot, remark: Callable[[str], None], world: World | None = None
 ) -> tuple[RoomMap | None, str]:
-    """Ask a connected robot for its rooms and its current room. Pass likely mistakes to `remark`.
+    """Ask a connected robot for its rooms and its current room. Report likely mistakes with `remark`.
 
     Returns:
         the rooms, with footprints from `world`, or None if the robot does not list its rooms; and the
@@ -102,7 +102,7 @@ def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
 def expect_enforceable(
     rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None, remark: Callable[[str], None]
 ) -> None:
-    """Raise UserError or NotReadyError if a rule cannot be enforced. Remark on rules that can be evaded."""
+    """Raise UserError or NotReadyError if a rule cannot be enforced. Call `remark` if one can be evaded."""
     rooms = () if room_map is None else room_map.goals
     for sentence in (one for rule in rules for one in unknown_rooms_in(rule, rooms)):
         raise UserError(sentence)
@@ -113,7 +113,7 @@ def expect_enforceable(
 
 
 def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) -> None:
-    """Raise NotReadyError if a rule needs the robot's position or a footprint that is unknown."""
+    """Raise NotReadyError if a rule needs a position or a footprint that neither robot nor map gives."""
     known = room_map or RoomMap((), "")
     outlined = {room.name for room in known.plan if room.footprint is not None}
     for rule, element in ((one, element) for one in rules for element in one.inside):
@@ -127,7 +127,7 @@ def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) 
 
 
 def limit_rooms(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:
-    """Return the rooms for a check. If there are too many, return None and make a remark."""
+    """Return `room_map`, or None if it has too many rooms for a check, and say so with `remark`."""
     if room_map is None or len(room_map.rooms) <= MAX_CHECKED_ROOMS:
         return room_map
     remark(
@@ -148,7 +148,7 @@ def unknown_rooms(program: str, room_map: RoomMap, skills: SkillTable = SKILLS) 
 
 
 def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
-    """Return the recorded instructions whose rooms the robot knows, each with its program."""
+    """Return the recorded instructions whose rooms the robot knows (None: all), each with its program."""
     replies = open_recorded("recorded").replies
     known = {instruction: solutions[0].program for instruction, solutions in replies.items()}
 
@@ -160,14 +160,14 @@ def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
 
 
 def with_closest_here(error: UnknownInstructionError, room_map: RoomMap | None) -> UnknownInstructionError:
-    """Return the same error, but suggest only instructions whose rooms the robot knows."""
+    """Return a copy of the error that suggests only instructions whose rooms the robot knows."""
     closest = find_closest(error.instruction, known_instructions(room_map))
     return UnknownInstructionError(error.model, error.instruction, closest)
 
 
 @contextmanager
 def suggesting_here(room_map: RoomMap | None) -> Iterator[None]:
-    """If a recorded model does not know an instruction, suggest only those whose rooms the robot knows."""
+    """In a `with` block, let a recorded model's error suggest only instructions for the robot's rooms."""
     try:
         yield
     except UnknownInstructionError as error:
@@ -185,7 +185,7 @@ def missing_skills(program: str, robot: Robot) -> list[str]:
 
 
 def error_sentence(error: Exception) -> str:
-    """Say why a mission ended. An unexpected error starts with its class, as in `KeyError: 'kitchen'`."""
+    """Return why a mission ended. For an unexpected error, begin with its class: `KeyError: 'kitchen'`."""
     if isinstance(error, UnknownInstructionError):
         return f"{error.model} has no program for this instruction"
     if isinstance(error, OSError) and error.filename is not None:

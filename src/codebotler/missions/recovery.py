@@ -43,7 +43,7 @@ class PriorApproval:
         return None if view.contract is None else cls(view.id, view.contract, before)
 
     def allows(self, view: SessionView, past: MissionPast) -> bool:
-        """Whether the program in `view`, for the rest of the mission `past`, does only what was approved."""
+        """Whether the program in `view`, which continues the mission `past`, does only what was approved."""
         if view.contract is None or view.problems:
             return False
         return not view.contract.beyond(self.contract_after(past.trace)).skills
@@ -63,9 +63,9 @@ class PriorApproval:
 
 
 def is_recoverable(view: SessionView, events: Sequence[LogLine], skills: SkillTable) -> bool:
-    """Whether a mission failed because a skill did, so that a model may be asked for the rest.
+    """Whether a mission failed because a skill failed, so that a model may write a program for the rest.
 
-    No called skill may have an effect without an event in the trace, since a second call would go unnoticed.
+    False if it called a skill with an effect that traces do not show, since a second call would go unnoticed.
     """
     ends = [line for line in events if line["event"] in SKILL_END_EVENTS]
     failed = bool(ends) and ends[-1]["event"] == "error" and view.reason.startswith(f"{ends[-1]['kind']}: ")
@@ -75,7 +75,7 @@ def is_recoverable(view: SessionView, events: Sequence[LogLine], skills: SkillTa
 
 
 def past_to_recover(session: MissionSession, robot: Robot, home: Path) -> MissionPast | None:
-    """Wait for a session. Return its mission's steps if a skill failed, or None if a person must decide."""
+    """Wait for a session to end. Return its past if a skill failed, or None if a person must decide."""
     session.join()
     if not is_recoverable(session.view, session.events(), robot.skills):
         return None
@@ -89,7 +89,7 @@ def ask_evidence(robot: Robot, home: Path, past: MissionPast, remark: Callable[[
     """
     before = [past.was] if past.was else []
     if is_resumable(robot):  # it knows no more than the log
-        return [*before, "A simulated robot cannot say. If it happened, the robot will not do it again."]
+        return [*before, "A simulated robot cannot say. If the step happened, the robot will not repeat it."]
     try:
         with Reservation(robot, home):
             place = ask_rooms(robot, remark)[1]

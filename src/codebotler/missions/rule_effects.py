@@ -1,4 +1,4 @@
-"""Find out what house rules would stop, in programs that are run once in simulation and in mission logs."""
+"""Find out which steps house rules would have stopped, in simulated programs and in logged missions."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LIMITED_SIMULATION = replace(SIMULATION, limits=Limits())  # nobody waits to sto
 
 @dataclass(frozen=True)
 class RuleEffect:
-    """How a run ended, and the house rule that stopped it or else first refused a step, if any."""
+    """How a run ended, and the house rule that stopped the run or, if none did, first refused a step."""
 
     ended: str  # finished, stopped, the kind of the error, or the final state of a logged mission
     rule: str = ""
@@ -44,7 +44,7 @@ class RuleEffect:
 
     @classmethod
     def of(cls, broken: RuleViolationError, ended: str, line: int | None = None) -> RuleEffect:
-        """Return the effect of a broken rule on a run. `ended` says how the run ended, such as `stopped`."""
+        """Return the effect of a broken rule. `ended` says how the run ended, such as `stopped`."""
         if broken.event is None:
             return cls("finished", broken.rule.name, "at the end")
         when = "late" if broken.is_late else "before"
@@ -59,7 +59,7 @@ class NotingGuard(RuleGuard):
         self.violations: list[RuleViolationError] = []
 
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Let a robot execute one skill, and collect the violation if a rule forbids it."""
+        """Execute a skill on a robot and return its result. Collect and raise the violation of any rule."""
         try:
             return super().perform(robot, skill, arguments)
         except RuleViolationError as broken:
@@ -67,7 +67,7 @@ class NotingGuard(RuleGuard):
             raise
 
     def at_end(self) -> RuleViolationError | None:
-        """Return and collect the violation of a rule that is broken if the mission ends now, or None."""
+        """If ending now would break a rule, collect and return this violation; otherwise return None."""
         broken = super().at_end()
         self.violations += [broken] if broken else []
         return broken
@@ -76,7 +76,7 @@ class NotingGuard(RuleGuard):
 def find_program_effects(
     programs: Iterable[str], rules: Sequence[Rule], world: World | None, skills: SkillTable
 ) -> Iterator[RuleEffect]:
-    """Simulate each program once and yield the effects in order. Without `world`, sample one for each."""
+    """Run each program once, in `world` or, if it is None, in a sampled world. Yield the effects in order."""
     sampler = first_samplers(CheckSettings())[0]
     with WorkerPool(cores()) as pool:
 
@@ -111,17 +111,17 @@ def _effect(outcome: Outcome, violations: Sequence[RuleViolationError]) -> RuleE
 
 
 def find_log_effect(path: Path, rules: Sequence[Rule], world: World | None, skills: SkillTable) -> RuleEffect:
-    """Return the first effect that rules would have had on a logged mission.
+    """Return the first effect that rules would have had on the mission whose log is the file `path`.
 
-    Without a world, the rooms are those of the map in the log. Raise UserError if the log is not valid, or
-    calls a skill that is not in the table.
+    If `world` is None, use the rooms of the map in the log. Raise UserError if the log is invalid, or calls a
+    skill that is not in `skills`.
     """
     events = read_log(path)
     try:
         world = world or next((map_from(line) for line in events if line["event"] == "map"), None)
         return _log_effect(events, NotingGuard(rules, world), LoggedRobot(world, skills))
     except (AttributeError, LookupError, TypeError, ValueError, re.error):
-        sentence = "the log does not fit the skills; name the files of own skills with --skills"
+        sentence = "the log does not match the known skills; name the files of own skills with --skills"
         raise UserError(sentence, file=path) from None
 
 

@@ -1,7 +1,4 @@
-"""`MissionSession`: takes one mission through writing, checking, approval and execution.
-
-The command line and the page control and observe it.
-"""
+"""`MissionSession`: takes a mission through writing, checking, approval and execution, for any interface."""
 
 from __future__ import annotations
 
@@ -52,8 +49,9 @@ _logger = logging.getLogger("codebotler.missions")
 class MissionSession(SharedView):
     """Runs one mission on its own thread, with a robot that stays connected during the whole session.
 
-    `changed` is called whenever the view changes, and must return at once. `before` is a session that must
-    end first. `world` is the map, if any. `within` is what every program may do, if a person has said so.
+    `home` contains the folder `missions`. `changed` is called after each change of the view, and must return
+    at once. The session first waits until `before` has ended. `world` is the map of the rooms. `within` is
+    the most that any program may do, or None if only rules limit programs.
     """
 
     def __init__(
@@ -94,20 +92,23 @@ class MissionSession(SharedView):
         self._thread.start()
 
     def join(self, seconds: float | None = None) -> None:
-        """Wait for the end of the session, for at most `seconds`."""
+        """Wait until the session has ended, for at most `seconds` if they are given."""
         self._thread.join(seconds)
 
     def edit(self, program: str) -> None:
-        """Replace and check the program. Raise MissionError after its approval or while a model writes."""
+        """Replace the program and check it in the background. Raise MissionError if that is impossible."""
         with self._editing, self._lock:
             if self._view.is_over or not self._view.may_be_edited:
-                raise MissionError("the program cannot be changed now")
+                raise MissionError("the program cannot be changed while a model writes or after approval")
             self._next_task = partial(self._take, program=program)
             self.is_changed_by_person = True
             self._change(program=program, author="", question=None, disabled_rules=(), **UNCHECKED)
 
     def switch_off(self, name: str, reason: str) -> None:
-        """Switch off a rule for this program only, log the reason, and check the program again."""
+        """Switch off the rule `name` for this program only, log the reason, and check again.
+
+        Raise MissionError if no program waits for approval, the rule is not in force, or the reason is empty.
+        """
         if not any(letter.isalnum() for letter in reason):
             raise MissionError("give a reason why this program may break the rule")
         with self._editing:
@@ -115,7 +116,7 @@ class MissionSession(SharedView):
             if mission is None or not view.may_be_approved:
                 raise MissionError("rules can be switched off only while a program waits for approval")
             if name not in {rule.name for rule in view.rules_in_force}:
-                raise MissionError(f'the rule "{name}" is not in force')
+                raise MissionError(f'the rule "{name}" is unknown or already switched off')
             mission.note(f'a person switched off the rule "{name}" for this program: {reason.strip()}')
             with self._lock:
                 self._next_task = partial(self._take, program=view.program)
@@ -123,32 +124,35 @@ class MissionSession(SharedView):
                 self._change(disabled_rules=(*view.disabled_rules, name), **UNCHECKED)
 
     def ask_again(self, *, repair: bool, max_tokens: int | None = None) -> None:
-        """Ask the model for another program. For a repair, send it the program and its problems.
+        """Ask the model for another program. With `repair`, also send the last one and its problems.
 
-        `max_tokens` is a new limit for this reply and later ones. None keeps the current limit.
+        `max_tokens` is a new limit for this reply and later ones; None keeps the limit. Raise MissionError if
+        the model cannot be asked now.
         """
         with self._editing, self._lock:
             if not self._view.may_be_asked_again:
-                raise MissionError("the model cannot be queried again at this point")
+                raise MissionError("the model can be asked again only while a mission waits for a person")
             self._author.max_tokens = max_tokens or self._author.max_tokens
             self._next_task = partial(self._ask, repair=repair)
             self.is_changed_by_person = True
             self._change(busy=f"asking {self._view.model}", is_written=True, reply="")
 
     def answer(self, question: ClarifyingQuestion | None, answer: ClarifyingAnswer, more: str = "") -> None:
-        """Say which behaviour a person means. With `none`, add the sentence `more` to the instruction.
+        """Continue with a person's answer to a clarifying question.
 
-        The answer `none` without a sentence, or to the last question, ends the mission.
+        `answer` is the index of an option, `decide` for the first one, or `none`. With `none`, the sentence
+        `more` is added to the instruction, and the model is asked again. Without a sentence, or after the
+        last question, `none` ends the mission.
 
         Raises:
-            MissionError: the session does not ask this question now, or there is no such option.
+            MissionError: this question is no longer open, or there is no such option.
         """
         with self._editing, self._lock:
             view = self._view
             if question is None or question is not view.question or not view.waits_for_answer:
-                raise MissionError("this question is no longer asked")
+                raise MissionError("this question is no longer open; look at the mission again")
             if isinstance(answer, int) and not 0 <= answer < len(question.options):
-                raise MissionError(f"there is no option {answer + 1}; there are {len(question.options)}")
+                raise MissionError(f"there is no option {answer + 1}; choose one of {len(question.options)}")
             if answer != "none" and more.strip():
                 raise MissionError('words can be added only to "none of these"; choose it, or leave them out')
             self.is_changed_by_person |= bool(more.strip())
@@ -166,24 +170,24 @@ class MissionSession(SharedView):
         by: str = "",
         is_person: bool = True,
     ) -> None:
-        """Approve the program that the person saw, whose digest is `seen`. `by` goes to the log.
+        """Approve the program whose digest is `seen`. Raise MissionError if it cannot be approved now.
 
-        `disabled_rules` are those that the person saw switched off, or None to skip this comparison.
-        `is_person` is False if no person decides now, because an earlier approval covers the program. It does
-        not cover what a person has changed since.
+        `disabled_rules` are those that the person saw switched off, or None to skip this comparison. `by`
+        says in the log who approved. `is_person` is False if nobody decides now, because an earlier approval
+        covers the program; then MissionError is raised if a person has changed the program since.
         """
         with self._editing:
             view, mission = self._view, self._mission
             if self._is_stopped:
-                raise MissionError("the mission is being stopped")
+                raise MissionError("the mission is being stopped; its program cannot be approved")
             if mission is None or view.busy or view.question is not None:
-                raise MissionError("the program has not been checked yet")
+                raise MissionError("the program is not checked yet, or a question about it is still open")
             if seen != view.digest or seen != program_digest(mission.summary.program):
-                raise MissionError("the program has changed; review it again")
+                raise MissionError("the program has changed; review the new program")
             if disabled_rules is not None and disabled_rules != view.disabled_rules:
                 raise MissionError("other rules are switched off now; review the program again")
             if not view.can_run:
-                raise MissionError("this program cannot run; mend it")
+                raise MissionError("this program has a syntax error; correct the program")
             if self.is_changed_by_person and not is_person:
                 raise MissionError("a person has changed this program; a person must approve it")
             mission.approve(despite_problems=despite_problems, by=by)

@@ -27,7 +27,7 @@ class StopButton:
         self._lock = threading.Lock()  # held briefly
 
     def press(self, by: str) -> None:
-        """Stop the robot, then call all listeners, newest first, even if some fail. Log the source `by`."""
+        """Stop the robot, then call all listeners, even if some fail. `by` names the source for the log."""
         now = time.monotonic()
         with ExitStack() as afterwards:
             with self._lock:
@@ -70,7 +70,7 @@ class StopButton:
         return max(0.0, min(self._reached_at, time.monotonic()) - self._pressed_at)
 
     def why_unstopped(self) -> str:
-        """Return why the robot did not accept a stop request, or "" if it did or gives no reason."""
+        """Return why the robot was not stopped, or "" if it was or gives no reason. Wait up to 6 seconds."""
         if self.ended.is_set():
             self._has_reached.wait(STOP_REQUEST_SECONDS)
         return str(getattr(self.robot, "failed_stop", ""))  # optional

@@ -64,7 +64,7 @@ class Approval(_Form):
 
 
 class AnswerForm(_Form):
-    """A person's answer if programs behave differently: the behaviour that the person means."""
+    """A person's answer to a clarifying question: which of several behaviours the person means."""
 
     answer: Annotated[int, Field(ge=1)] | Literal["none", "decide"] = Field(
         description="The number of an option, from 1; `none` of them; or `decide` to take the most frequent."
@@ -137,7 +137,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/continue", status_code=201)
     async def continue_mission(mission: str, form: ContinueForm) -> dict[str, Any]:
-        """Begin the rest of a mission as a new mission. Without an instruction, replace its program."""
+        """Begin a new mission for the rest of another. If that one has no instruction, edit the program."""
         summary, _ = await asyncio.to_thread(_read_mission, console, mission)
         past = await asyncio.to_thread(console.past_of, summary.id)
         if form.happened is not None:
@@ -192,7 +192,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/answer", status_code=202)
     def answer(mission: str, given: AnswerForm) -> dict[str, Any]:
-        """Say which of the behaviours in `question` is meant."""
+        """Answer the mission's `question`: say which of its behaviours is meant."""
         session = _current_session(console, mission)
         chosen = given.answer if isinstance(given.answer, str) else given.answer - 1
         session.answer(session.view.question, chosen, given.more)
@@ -216,7 +216,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
             bool, Query(description="Stop only a program that is approved or runs.")
         ] = False,
     ) -> dict[str, Any]:
-        """Stop the current mission, and return whether there was one, and a warning about a lost robot."""
+        """Stop the current mission. Return whether there was one, and a warning if a robot was lost."""
         stopping = console.stop(BY_PAGE, only_moving=only_moving, holds=True)
         return {"stopping": stopping, "warning": console.warning}
 
@@ -233,7 +233,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: NewProgram) -> dict[str, Any]:
-        """Check a program against the house rules, in the rooms of the current mission, if any."""
+        """Check a program and the house rules, in the rooms of the current mission if there is one."""
         return console.check(new.program, console.view.room_map, console.rules).data()
 
     @api.get("/robot", tags=["robot"])
@@ -308,7 +308,7 @@ def _current_session(console: Console, mission: str) -> MissionSession:
     if session is not None and mission in {_CURRENT, session.view.id}:
         return session
     summary, _ = _read_mission(console, mission)
-    raise HTTPException(409, f"mission {summary.id} is over; it can only be read")
+    raise HTTPException(409, f"mission {summary.id} is over and can only be read")
 
 
 def _read_mission(console: Console, mission: str) -> tuple[MissionSummary, list[LogLine]]:

@@ -49,8 +49,9 @@ CLEANUP_SECONDS = 2.0
 class Console:
     """Begins, changes and stops the missions of one robot, for the page, for agents and for the terminal.
 
-    Any thread may use it. Only missions connect the robot. `models` are names; the first is the default.
-    If a skill fails, a model may write the rest of the mission, `recoveries` times in a row.
+    Any thread may use it. Only missions connect the robot. The first of the `models` is the default. `within`
+    is the most that any program may do. A model writes `candidates` programs for an instruction. If a skill
+    fails, a model may write a program for the rest of the mission, `recoveries` times in a row.
     """
 
     def __init__(
@@ -98,7 +99,7 @@ class Console:
         self.end()
 
     def end(self) -> None:
-        """Stop the current mission, and wait for its end, but not for long if it had not begun to run."""
+        """Stop the current mission, and wait for its end: up to 11 s, or 2 s if its program has not begun."""
         with self._lock:
             session, self._may_recover = self.session, None
             self._end_hold()
@@ -122,14 +123,14 @@ class Console:
         return SessionView() if session is None else session.view
 
     async def view_once(self, *, over: bool) -> SessionView:
-        """Wait until a mission is over, or has begun if not `over`, at most 15 s, and return the view."""
+        """Wait at most 15 s until the mission is over, or has begun if `over` is false. Return the view."""
         await self.notifier.until(lambda: self.view.is_over == over, MAX_WAIT_SECONDS)
         return self.view
 
     def begin(self, order: MissionOrder, *, by_agent: bool = False) -> MissionSession:
         """Begin a mission, by default with the first model. Raise MissionError while another mission runs.
 
-        If an agent begins it, the notice about an interrupted mission stays for a person.
+        With `by_agent`, the notice about interrupted missions stays, so that a person still sees it.
         """
         noticed = self.interrupted if by_agent else ()
         session = self._begin(order)
@@ -155,7 +156,7 @@ class Console:
             if after is not None and after is not self._may_recover:
                 raise MissionError("somebody pressed STOP, or began another mission")
             if self._stopping.is_alive():
-                raise MissionError("a stop of the robot has not returned; check the robot")
+                raise MissionError("the robot has not answered a stop request yet; check the robot")
             if before is not None and before.is_stuck:
                 raise MissionError(f"a skill of mission {before.view.id} has not ended; check the robot")
             self._end_hold()
@@ -185,13 +186,16 @@ class Console:
         return session
 
     def past_of(self, mission: str) -> MissionPast:
-        """Read what a mission did and saw, by ID or `last`. Raise UserError if it cannot be continued."""
+        """Read what a mission (an ID or `last`) did and saw. Raise UserError if it cannot be continued."""
         return read_past(find_mission(self.home, mission), self.robot.skills, self.robot.name, self.world)
 
     def rest_of(
         self, past: MissionPast, program: str = "", author: str = "", *, model: str = ""
     ) -> MissionOrder:
-        """Return the order to continue a mission by `program`, its own if nothing was done, or a model's."""
+        """Return an order for the rest of a mission. Without a program, reuse its own or ask a model.
+
+        `model` is the name of the model to ask, or "" for the one that wrote the mission's program.
+        """
         # A step-by-step mission has no program of its own: the text only describes it.
         skills = called_skills(parse_leniently(past.program), self.robot.skills)
         if not program and ((past.is_untouched and skills) or not past.instruction):
@@ -238,7 +242,7 @@ class Console:
 
     @property
     def is_held(self) -> bool:
-        """Whether a person must approve the next mission, after a STOP or a loss, even before a restart."""
+        """Whether a person must approve the next mission, since STOP was pressed or the robot was lost."""
         return self._holds or self._hold_file.exists()
 
     def _end_hold(self) -> None:
@@ -259,8 +263,9 @@ class Console:
     def stop(self, by: str, *, only_moving: bool = False, holds: bool = False) -> bool:
         """Ask the current mission to stop. Return at once whether there was a mission to stop.
 
-        A robot that was lost, or did not confirm a stop, is stopped again. `only_moving` spares a mission
-        without approval if no robot was lost. With `holds`, a person must approve the next one.
+        `by` names the source for the log. A robot that was lost, or did not confirm a stop, is stopped again.
+        With `only_moving`, a mission without approval goes on, unless a robot was lost. With `holds`, a
+        person must approve the next mission.
         """
         with self._lock:
             session, self._may_recover = self.session, None
@@ -284,7 +289,7 @@ class Console:
 
     @property
     def warning(self) -> str:
-        """A sentence about a robot that was lost and may still move, until a person approves a mission."""
+        """Why a lost robot may still move, as a sentence; empty after a person has approved a new mission."""
         lost = self._forget_loss()
         return "" if lost is None else f"The robot may still move. {capitalize(lost.view.reason)}."
 
@@ -311,7 +316,7 @@ class Console:
     def check(
         self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()
     ) -> CheckResult:
-        """Check a program for a client. Without a map, use the rooms that the program names."""
+        """Check a program outside any mission. Without `room_map`, use the rooms that the program names."""
         skills = self.robot.skills
         with self._checking:  # the check of a mission must not wait for those of many clients
             return check(program, room_map=room_map, house_rules=rules, skills=skills, explores=True)
@@ -333,7 +338,7 @@ class Notifier:
             wake()
 
     def close(self) -> None:
-        """End the loops over `changes`, because the server ends."""
+        """End all loops over `changes`, because the server ends."""
         self.is_closed = True
         self.change()
 
@@ -357,7 +362,7 @@ class Notifier:
                 self._wakes.remove(wake)
 
     async def until(self, is_met: Callable[[], bool], seconds: float | None = None) -> bool:
-        """Wait until a condition is met, for at most `seconds`, and return whether it is met."""
+        """Wait until a condition is met, for at most `seconds` if given. Return whether it is met."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds), aclosing(self.changes()) as changes:
                 async for _ in changes:
@@ -375,4 +380,4 @@ def is_version_of(program: str, changed: str) -> bool:
 
 def _check_length(text: str) -> None:
     if len(text) > MAX_PROGRAM_CHARACTERS:
-        raise UserError(f"this text has {len(text):,} characters; the limit is {MAX_PROGRAM_CHARACTERS:,}")
+        raise UserError(f"the text has {len(text):,} characters; the limit is {MAX_PROGRAM_CHARACTERS:,}")

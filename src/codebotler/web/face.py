@@ -65,7 +65,7 @@ def router(console: Console, face: Face) -> APIRouter:
 
     @routes.post("/api/face/answer")
     def answer(given: FaceAnswer) -> dict[str, Any]:
-        """Answer the question. Only the first answer counts, and late ones are refused."""
+        """Answer the robot's question. Only the first answer counts; later answers get status 409."""
         try:
             face.answer(given.question, given.option)
         except AnswerError as error:

@@ -52,7 +52,7 @@ class MapState:
 
 
 def floorplan(world: World, state: MapState) -> str:
-    """Return an SVG map of a world, seen from above."""
+    """Return a map of a world with the robot, seen from above, as SVG text."""
     rooms = laid_out(world).rooms[:MAX_DRAWN_ROOMS]
     points = [corner for one in rooms for corner in one.footprint or ()]
     points += [*state.trail, *([state.at] if state.at else [])]

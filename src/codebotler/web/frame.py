@@ -49,7 +49,7 @@ class Frame:
     has_robot: bool = True
 
     def __call__(self, title: str, here: str, parts: Sequence[tuple[str, str]] = ()) -> None:
-        """Begin a page. The bar highlights the address `here`, and on small screens links to `parts`."""
+        """Begin a page. Its bar highlights the address `here`. On small screens, the bar links to `parts`."""
         ui.page_title(f"{title} · {self.brand}")
         ui.add_head_html(_STYLESHEET_HTML.format(prefix=outside("")))
         if self.has_robot:
@@ -108,7 +108,7 @@ def scroll_to(element: str) -> None:
 
 
 def warn(sentence: str, seconds: float = 5.0) -> None:
-    """Show a warning for some seconds."""
+    """Show a warning on the page for the given number of seconds."""
     ui.notify(visible_lines(sentence), type="warning", position="bottom", timeout=1000 * seconds)
 
 
@@ -147,7 +147,7 @@ Content = TypeVar("Content")
 
 
 class DrawnBox(Element, Generic[Content]):
-    """An element that draws its content with a function, and again only when the content has changed."""
+    """An element that draws its content with `draw`, but only when the content has changed."""
 
     def __init__(self, kind: str, draw: Callable[[Content], None], tag: str = "div") -> None:
         super().__init__(tag)
@@ -157,7 +157,7 @@ class DrawnBox(Element, Generic[Content]):
         self.content: Content | None = None
 
     def show(self, content: Content | None) -> None:
-        """Draw the content, unless it is drawn already, or hide the element if the content is None."""
+        """Draw the content if it has changed. Hide the element if the content is None."""
         self.set_visibility(content is not None)
         is_same, self.content = content == self.content, content
         if not is_same:
@@ -203,7 +203,7 @@ class Pages:
 
 
 def installed_pages() -> tuple[Pages, ...]:
-    """Load the pages of installed packages, but report and leave out those that fail to load."""
+    """Load the pages of installed packages. Leave out those that fail, and report them on stderr."""
     found: list[Pages] = []
     for point in sorted(entry_points(group=_ENTRY_POINTS), key=lambda point: point.name):
         try:

@@ -147,7 +147,7 @@ def application(
     runs: Path = RUNS_FOLDER,
     routes: Sequence[BaseRoute] = (),
 ) -> FastAPI:
-    """Create the web application with all its pages and routes, but without the guard of requests."""
+    """Create the web application with all its pages and routes, but without `Guard`."""
     links = tuple((pages.name, pages.address) for pages in further)
     to_face = (FACE_LINK,) if console and console.face else ()
     frame = (
@@ -210,9 +210,9 @@ def _is_taken(routes: Sequence[BaseRoute], method: str, path: str) -> bool:
 
 
 class Presence:
-    """ASGI middleware that calls `alone` once no operator has had a page open for some seconds.
+    """ASGI middleware that calls `alone` when no operator has had a page open for `seconds`.
 
-    `alone` must return at once. The delay allows operators to reload their page.
+    `alone` must return at once. The delay lets operators reload their page.
     """
 
     def __init__(self, app: ASGIApp, seconds: float, alone: Callable[[], object]) -> None:
@@ -275,10 +275,7 @@ class _Server(uvicorn.Server):
         await super().startup(sockets)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """End the companion first, since it may keep connections open, and wait until the robot has stopped.
-
-        After this, uvicorn lets the signal that ended it end the process.
-        """
+        """End the companion, which may keep connections open, then the server. Wait until the robot stops."""
         if self._accompanying is not None:
             self._accompanying.cancel()
         if self._console is not None:

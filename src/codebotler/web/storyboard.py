@@ -70,10 +70,7 @@ class Storyboard(NamedTuple):
 
 
 def draw_strips(board: Storyboard) -> None:
-    """Draw a strip for each different outcome in imagined worlds.
-
-    Visited rooms are ticked off, and strips that the actual run contradicts are collapsed.
-    """
+    """Draw a strip for each outcome in imagined worlds. Tick visited rooms; fold strips that do not fit."""
     shown = strips(board.check)
     PlainText("h3", board.title if shown else "")
     numbers = [scenes_reached(strip, board.visited, board.learned) for strip in shown]
@@ -126,7 +123,7 @@ def draw_scene(
 ) -> None:
     """Draw one visit to a room. `wrong` holds the numbers of steps to draw in red.
 
-    `mark` is a key of `SCENE_MARKS`. With an `anchor`, each step gets it and its number as HTML ID.
+    `mark` is a key of `SCENE_MARKS`, or "". With the anchor `s`, for example, step 2 gets the HTML ID `s2`.
     """
     kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
     kinds += ["wrong"] * (scene.step in wrong) + [mark] * bool(mark)
@@ -185,7 +182,7 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
 def scenes(
     steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int | None] = frozenset()
 ) -> tuple[Scene, ...]:
-    """Group the steps of a run by visits to rooms. Of a long run, show both ends and the `needed` steps."""
+    """Group the steps of a run by visits to rooms. Shorten long runs, but keep the `needed` steps."""
     found: list[Scene] = [Scene(shortened(start, _MAX_STEP_TEXT))]
     for is_shown, some in select_steps(steps, needed):
         if not is_shown:

@@ -537,7 +537,7 @@ def test_a_mission_is_continued_only_once(tmp_path: Path) -> None:
         last.approve()
         with Reservation(Simulated(WORLD, speed=None), tmp_path) as reserved:
             last.run(reserved, "lab")
-    with pytest.raises(UserError, match=f"{last.id} is done"):
+    with pytest.raises(UserError, match=f"{last.id}, which is done"):
         read_past(folder, SKILLS)
 
 

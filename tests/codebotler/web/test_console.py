@@ -270,7 +270,7 @@ def test_without_an_instruction_no_model_is_asked_again(tmp_path: Path) -> None:
     with make_console(tmp_path, author=Author(HELLO)) as console:
         session = console.begin(MissionOrder(model="author", program=HELLO))
         assert not wait_until(console, lambda view: view.may_be_approved).may_be_asked_again
-        with pytest.raises(MissionError, match="cannot be queried"):
+        with pytest.raises(MissionError, match="can be asked again only"):
             session.ask_again(repair=False)
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class RunSettings(NamedTuple):
-    """Two functions that `run` and `continue` call, with the options that both share filled in."""
+    """Two functions for `run` and `continue`, with the values of their shared options already filled in."""
 
     request: Callable[..., Request]  # takes the other fields of a request
     open_console: Callable[..., Console]
@@ -35,7 +35,7 @@ def run_settings(
     recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> RunSettings:
-    """Fill in the options that `run` and `continue` share, such as --model. Each adds options of its own."""
+    """Return functions for `run` and `continue` with the values of their shared options, such as --model."""
     from functools import partial
 
     from codebotler.cli.operating.run import Request

@@ -53,7 +53,7 @@ def serve_agents(
 
     asks = not http if ask_client is None else ask_client
     if agent_token is not None and not http:
-        raise UserError("--agent-token is for --http; leave it out")
+        raise UserError("--agent-token needs --http; add --http, or leave out --agent-token")
     streams = None if http else server.take_streams()
     console = open_console(model, base_url, shared, candidates=candidates)
     writes = bool(model) or not is_recorded(console.models[0])

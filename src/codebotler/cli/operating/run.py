@@ -59,9 +59,9 @@ class Request:
         if self.what.endswith(".py") and not self.is_program:
             raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
         if (self.recoveries or self.candidates > 1) and self.is_program and self.past is None:
-            raise UserError("--recover and --candidates need an instruction, but this is a program")
+            raise UserError("--recover and --candidates need an instruction, but the argument is a program")
         if self.what == "-" and not self.yes:
-            raise UserError("the program uses standard input, so approval cannot be read; add --yes")
+            raise UserError("standard input cannot hold both the program and your approval; add --yes")
 
     def order_on(self, console: Console) -> MissionOrder:
         """Convert the request to an order for the console. A program file or standard input is read now."""
@@ -111,7 +111,7 @@ def run(console: Console, request: Request) -> int:
                 approval = PriorApproval.of(session.view)
             order = console.rest_of(past)
             print_rich(past_view(past))
-            note(f"recovering: asking {order.model} for the rest")
+            note(f"recovering: asking {order.model} for the rest of the mission")
             request = replace(request, despite_problems=False)  # accepted for the first program only
         raise AssertionError("the last mission has no rest")
 
@@ -180,7 +180,7 @@ def _is_approved(
         note(f"not run because of problems{anyway}")
         return False
     if is_covered:
-        note("the rest stays within what was approved before")
+        note("the rest of the mission stays within what was approved before")
     elif not request.yes and not confirm(f"run the program on the robot {robot.name}?"):
         session.stop("the person at the terminal")
         note("not run" if view.past else "not run; the robot has not moved")
@@ -217,7 +217,7 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
         session.stop_soon(SIGNALS[signal.Signals(number)])
         got.append(number)
         if len(got) > 1:
-            note(f"\nasked the robot to stop; it has {STOP_GRACE_SECONDS:g} s to confirm")
+            note(f"\nasked the robot to stop; the robot has {STOP_GRACE_SECONDS:g} s to confirm")
 
     outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     obeyed = [number for number in SIGNALS if not (outlives and number is signal.SIGHUP)]
@@ -277,7 +277,7 @@ def _ask_whether(past: MissionPast) -> bool:
 
 
 def past_view(past: MissionPast) -> Group:
-    """Show what a mission did and saw before it ended."""
+    """Return what a mission did and saw before it ended, for printing."""
     head = Text.assemble((f"mission {past.mission}", "bold"), f" ended early: {shortened(past.why)}")
     steps = [Text(f"  {step}", "dim") for step in past.steps] or [Text("  no step was finished", "dim")]
     return Group(head, Text("done so far:"), *steps)

@@ -38,12 +38,12 @@ def read_program(name: str) -> str:
     else:
         text = read_text(Path(name))
     if not text.strip():
-        raise UserError("contains no program", file=STANDARD_INPUT if name == "-" else name)
+        raise UserError("no program found", file=STANDARD_INPUT if name == "-" else name)
     return text
 
 
 def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool = False) -> RenderableType:
-    """Show the verdict, the problems, and a run in one sampled world, or all different runs."""
+    """Return the verdict, the problems and a run in a sampled world, or all different runs (`shows_all`)."""
     parts: list[RenderableType] = [_verdict(found, name)]
     lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
@@ -127,7 +127,7 @@ def _sample(sample: Sample) -> Iterator[RenderableType]:
 
 
 def contract_view(contract: Contract, skills: SkillTable) -> Group:
-    """Show what a program may do at most: in a sentence or two, and in a table with a row for each skill."""
+    """Return what a program may do at most: a sentence or two, and a table with a row for each skill."""
     sentence = contract_sentence(contract, skills, shortened)
     head = Text.assemble(("\nwhat it may do at most", "bold"), f"\n{sentence}\n")
     table = grid("left", "left", "left")
@@ -137,10 +137,10 @@ def contract_view(contract: Contract, skills: SkillTable) -> Group:
 
 
 def write_contract(file: Path | None, contract: Contract | None) -> None:
-    """Write a contract to a new file, if given. Raise UserError if it exists, or without a contract."""
+    """Write a contract to a new file, if one is named. Raise UserError if it exists or `contract` is None."""
     if file is None:
         return
     if contract is None:
-        raise UserError("the program has no contract, since it cannot run")
+        raise UserError("no contract could be derived from the program; correct its problems first")
     write_new(file, contract_yaml(contract))
     note(f"wrote {file}")

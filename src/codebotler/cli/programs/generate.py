@@ -102,7 +102,7 @@ def choose_candidate(
     count: int,
     ask: Callable[[str], str] | None,
 ) -> str | None:
-    """Get several programs from a model, and return the one that a person chooses, or None.
+    """Get several programs from a model. Return the one that a person chooses, or None if there is none.
 
     If the person first wants none of them, a sentence added to the instruction begins a second round.
 
@@ -157,7 +157,7 @@ def print_checked(program: str, settings: CheckSettings, room_map: RoomMap | Non
 
 
 def question_view(question: ClarifyingQuestion) -> RenderableType:
-    """Show a question: the facts of the imagined world, and the storyboard of each option."""
+    """Return a question for printing: the facts of the imagined world, and a storyboard for each option."""
     facts = f"Suppose that {listed([*map(shortened, question.facts)])}." if question.facts else ""
     parts: list[RenderableType] = [Text("Which did you mean?", "bold"), *([Text(facts)] if facts else [])]
     for number, option in enumerate(question.options, 1):
@@ -171,13 +171,13 @@ def question_view(question: ClarifyingQuestion) -> RenderableType:
 
 
 def ask_which(question: ClarifyingQuestion, read_line: Callable[[str], str]) -> ClarifyingAnswer:
-    """Show a question, and read lines until one is an answer. Raise UserError at the end of the input."""
+    """Print a question, and read lines until one is an answer. Raise UserError at the end of the input."""
     console(stderr=True).print(question_view(question))
     numbers = ", ".join(str(number) for number in range(1, len(question.options) + 1))
     while True:
         line = read_line(f'Answer {numbers}, "none" or "you decide": ')
         if not line:
-            raise UserError("no answer; `you decide` takes the first one")
+            raise UserError("no answer was given; `you decide` takes the first one")
         try:
             return question.parse(line)
         except UserError as error:

@@ -31,11 +31,11 @@ def find_replayed_files(paths: Sequence[Path]) -> list[Path]:
     found: list[Path] = []
     for path in paths:
         if not path.exists():
-            raise UserError("there is no such file", file=path)
+            raise UserError("there is no such file or folder; correct the path", file=path)
         parts = sorted(path.iterdir()) if path.is_dir() and not _is_replayed(path) else [path]
         files = list(filter(_is_replayed, parts))
         if not files:
-            raise UserError("is no program (.py), log (.jsonl) or mission, and contains none", file=path)
+            raise UserError("there is no program (.py), log (.jsonl) or mission here", file=path)
         found += files
     return found
 
@@ -66,7 +66,7 @@ def replay(
 
 
 def replay_data(effects: Mapping[Path, RuleEffect], rules: Sequence[Rule]) -> dict[str, Any]:
-    """Return for JSON what the rules do to each file, and how many files break each rule."""
+    """Return data for JSON: what the rules do to each file, and how many files break each rule."""
     times = Counter(effect.when or NO_EFFECT for effect in effects.values())
     pairs = Counter((effect.rule, effect.when) for effect in effects.values())
     return {
@@ -77,7 +77,7 @@ def replay_data(effects: Mapping[Path, RuleEffect], rules: Sequence[Rule]) -> di
 
 
 def replay_view(effects: Mapping[Path, RuleEffect], rules: Sequence[Rule]) -> Group:
-    """Show a line for each file with the rule that it breaks, and then how many files break each rule."""
+    """Return a table of the files and the rules that they break, and another that counts files by rule."""
     files, numbers = grid("left", "left", "left", "left", "left"), grid("left", "right", "right", "right")
     for file, effect in effects.items():
         line = "" if effect.line is None else f"line {effect.line}: "

@@ -44,7 +44,7 @@ def rooms_of(world: World | None) -> list[str]:
 
 
 def review_view(found: Sequence[Review]) -> RenderableType:
-    """Show rules with their examples and warnings."""
+    """Return rules with their examples and warnings, for printing."""
     parts: list[RenderableType] = []
     for one in found:
         parts += [*_rule(one), Text()]
@@ -65,7 +65,7 @@ def _rule(one: Review) -> Iterator[RenderableType]:
 
 
 def steps_view(trace: Trace) -> RenderableType:
-    """Show the steps of an example, numbered from 1."""
+    """Return a table with the steps of an example, numbered from 1."""
     table = grid("right", "left")
     if not trace:
         table.add_row(Text(), Text("the robot does nothing", "dim"))
@@ -83,7 +83,7 @@ def is_drive(event: Event) -> bool:
 
 
 def step_sentence(event: Event, room: str = "") -> str:
-    """Describe a step, such as `drives to "kitchen" from office`, but without the start if it is `room`."""
+    """Return a step in words: `drives to "kitchen" from office`, but without `from ...` if that is `room`."""
 
     def show(text: str) -> str:
         return "…" if text in ANY_ARGUMENT else visible(text)
@@ -99,7 +99,7 @@ def step_sentence(event: Event, room: str = "") -> str:
 
 
 def review_data(found: Sequence[Review]) -> list[dict[str, object]]:
-    """Return rules with their examples and warnings, for JSON."""
+    """Return data for JSON: rules with their examples and warnings."""
     return [
         {
             "name": one.rule.name,

@@ -94,7 +94,7 @@ def _example(row: Skill) -> list[Any]:
 
 
 def skills_view(skills: SkillTable) -> RenderableType:
-    """Show the user's own skills, or else all built-in ones, as models see them and with their outcomes."""
+    """Return the user's own skills, or else the built-in ones, as models see them, with example outcomes."""
     own = [row for row in skills.rows if row not in SKILLS.rows]
     return Group(*_lines(own or SKILLS.rows, skills))
 
@@ -111,7 +111,7 @@ def _lines(rows: Sequence[Skill], skills: SkillTable) -> Iterator[RenderableType
 
 
 def skills_data(skills: SkillTable) -> list[dict[str, Any]]:
-    """Return the skills, each with the outcomes of its example, for JSON."""
+    """Return data for JSON: the skills, each with the outcomes of its example."""
     return [
         {
             "name": row.name,

@@ -63,7 +63,7 @@ class Progress:
     moments: tuple[Moment, ...] = ()  # the latest entries of the activity list
 
     def after(self, line: LogLine) -> Progress:
-        """Return the progress after an event."""
+        """Return the progress after an event in the log."""
         event = line["event"]
         if event == "state":
             return self.with_state(MissionState(line["state"]), line["clock"])
@@ -84,12 +84,12 @@ class Progress:
         return replace(now, moments=(*now.moments, _moment(line, text))[-_MAX_MOMENTS:])
 
     def with_state(self, state: MissionState, clock: float) -> Progress:
-        """Return the progress after a change of state."""
+        """Return the progress after the mission enters `state`, at `clock` seconds on the robot's clock."""
         clock = self.clock if state in _STOP_STATES else max(self.clock, clock)
         return replace(self, clock=clock, has_begun=self.has_begun or state is MissionState.RUNNING)
 
     def with_skill(self, line: LogLine) -> Progress:
-        """Return the progress after the start of a skill."""
+        """Return the progress after a `skill` event in the log, which starts a skill."""
         name = line["skill"]
         recording = _recording(name)
         drives = recording is not None and recording.is_drive
@@ -105,14 +105,14 @@ class Progress:
         return replace(now, room=now.subject, left=self.room) if drives else now
 
     def with_position(self, at: Point) -> Progress:
-        """Return the progress after a reported position."""
+        """Return the progress after the robot has reported its position, in metres."""
         now = replace(self, at=at, is_between=self.is_between or self.is_driving)
         if self.trail and math.dist(self.trail[-1], at) < _MIN_MOVE_METRES:
             return now
         return replace(now, trail=(*self.trail, at)[-_MAX_MOMENTS:])
 
     def with_result(self, result: object) -> Progress:
-        """Return the progress after the current skill has succeeded."""
+        """Return the progress after the current skill has succeeded with `result`."""
         recording = _recording(self.skill)
         now = self
         match recording and recording.kind:
@@ -135,7 +135,7 @@ class Progress:
         return now
 
     def with_failure(self, event: str) -> Progress:
-        """Return the progress after the current skill has failed or was cancelled."""
+        """Return the progress after the skill ended with `error`, `cancelled` or `late` (after a stop)."""
         recording = _recording(self.skill)
         if recording is not None and recording.is_drive and event != "late":
             return replace(self, room=self.left, is_between=self.is_between or event == "cancelled")

@@ -39,7 +39,7 @@ Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking",
 
 @dataclass(frozen=True)
 class MissionOrder:
-    """A request for a mission. Raises UserError if it asks for nothing, or if a step of `past` is unsure."""
+    """A request for a mission. Raises UserError if it asks for nothing, or if `past` has an unsure step."""
 
     instruction: str = ""
     model: str = ""  # empty if no model may be asked
@@ -58,7 +58,7 @@ class MissionOrder:
             clean_instruction(self.instruction)
 
     def first_view(self, number: int, rules: tuple[Rule, ...], within: Contract | None) -> SessionView:
-        """Return the view of a session, with its number, that has just begun to carry out this order."""
+        """Return the first view of session `number`, which will carry out this order."""
         return SessionView(
             number,
             instruction=self.instruction,
@@ -120,7 +120,7 @@ class SessionView:
 
     @property
     def contract(self) -> Contract | None:
-        """The program's contract, as its check derived it; None if it was not checked."""
+        """The contract that the check derived from the program; None if there is none."""
         return None if self.check is None else self.check.contract
 
     @property
@@ -130,7 +130,7 @@ class SessionView:
 
     @property
     def can_run(self) -> bool:
-        """Whether the program can start. Only syntax errors prevent it; people can accept other problems."""
+        """Whether the program can start. It cannot with a syntax error; people can accept other problems."""
         return self.check is None or not any(one.kind in _SYNTAX_ERRORS for one in self.check.problems)
 
     @property
@@ -145,7 +145,7 @@ class SessionView:
 
     @property
     def phase(self) -> Phase:
-        """The session's current work, such as `writing` or `checking`, or the final state of its mission."""
+        """The session's work, such as `writing`, or else its mission's state; "" if there is neither."""
         if self.is_over or self.is_running:
             return "" if self.state is None else self.state
         if self.is_written:
@@ -165,12 +165,12 @@ class SessionView:
 
     @property
     def is_approved(self) -> bool:
-        """Whether the program is approved and not yet over, so that the robot works or is about to."""
+        """Whether the program is approved and has not ended: the robot works or will soon begin."""
         return self.is_running or (self.state is MissionState.APPROVED and not self.is_over)
 
     @property
     def may_be_approved(self) -> bool:
-        """Whether the program can be approved now."""
+        """Whether the program is checked and can be approved now."""
         return self.state is MissionState.CHECKED and not (self.is_over or self.busy or self.question)
 
     @property

@@ -29,7 +29,7 @@ def event_text(line: LogLine) -> str:
 
 
 def timeline(events: Iterable[LogLine]) -> Iterator[tuple[LogLine, str]]:
-    """Yield events with descriptions. Leave out feedback, repeated states, and `stopped` after a stop."""
+    """Yield the events to show to people, each with a description. Leave out feedback and repetitions."""
     before, is_stopped = "", False
     for number, line in enumerate(events):
         words = event_text(line) if number else "mission created"

@@ -27,7 +27,7 @@ def pose_in_frame(at: Point, heading: float, time: int) -> Message:
 
 
 def frame_transform(at: Point, heading: float, time: int) -> Message:
-    """Build the transform from the map to the robot's frame, with the arguments of `pose_in_frame`."""
+    """Build the transform from the map to the robot's frame, from the same values as `pose_in_frame`."""
     pose = _pose(at, heading)
     return {
         "timestamp": _time(time),
@@ -39,12 +39,12 @@ def frame_transform(at: Point, heading: float, time: int) -> Message:
 
 
 def scene_update(rooms: Iterable[Room], time: int) -> Message:
-    """Build the outlines and names of rooms. Every room needs a footprint and a stopping point."""
+    """Build a message with the outlines and names of rooms. Each needs a footprint and a stopping point."""
     return {"entities": [_entity(room, time) for room in rooms]}
 
 
 def log_line(level: int, message: str, name: str, line: int | None, time: int) -> Message:
-    """Build a log line for a skill or kind of event (`name`), a program line, and a time in ns since 1970."""
+    """Build a log message. `name`: a skill or event kind; `line`: of the program; `time`: ns since 1970."""
     where = {"file": "", "line": 0} if line is None else {"file": "program.py", "line": line}
     return {"timestamp": _time(time), "level": level, "message": message, "name": name, **where}
 

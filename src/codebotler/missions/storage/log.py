@@ -41,7 +41,7 @@ _REQUIRED_KEYS: Mapping[str, frozenset[str]] = {
 
 
 class MissionState(StrEnum):
-    """The state of a mission."""
+    """The state of a mission. `NEXT_STATES` lists which states can follow."""
 
     DRAFTING = "drafting"
     CHECKED = "checked"
@@ -128,7 +128,7 @@ def open_log(folder: Path) -> Appender:
 
 
 def add_event(log: Appender, event: str, clock: float, **data: object) -> LogLine:
-    """Append an event with the current time to a log, and return the event."""
+    """Append an event of the kind `event` to a log, and return it. `clock`: seconds on the robot's clock."""
     line = {"time": round(time.time(), 6), "clock": round(clock, 6), "event": event, **data}
     log.append(to_line(line))
     return line

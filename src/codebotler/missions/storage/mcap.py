@@ -209,7 +209,7 @@ def export_mcap(
     clock: TimeSource,
     folder: Path | None = None,
 ) -> None:
-    """Write an MCAP file atomically. Raise UserError instead of overwriting a file of another kind."""
+    """Write a mission to an MCAP file, atomically. Raise UserError if `path` is another kind of file."""
     expect_replaceable(path, b"\x89MCAP")
     whole = io.BytesIO()
     write_mcap(whole, summary, events, folder=folder, clock=clock)

@@ -89,12 +89,12 @@ class MissionPast:
         return [_step_words(event) for event in self.trace if not event.failed]
 
     def here(self, place: str) -> str:
-        """Say that the robot is at a place, and what it holds."""
+        """Return a sentence that says that the robot is at `place`, and what it holds."""
         return f'The robot is in "{shortened(place)}" and holds {self._held_words}.'
 
     @property
     def was(self) -> str:
-        """Say where the robot was last and what it held, according to the log; empty if unknown."""
+        """A sentence that says where the robot was last and what it held, by the log; empty if unknown."""
         where = f'the robot was in "{shortened(self.place)}" and held {self._held_words}'
         return f"Just before that, {where}, says the log." if self.place else ""
 
@@ -104,7 +104,7 @@ class MissionPast:
 
     @property
     def question(self) -> str:
-        """The question to a person whether the unsure step happened; empty if there is none."""
+        """A clause that names the unsure step, for a question to a person; empty if there is no such step."""
         if self.unsure is None:
             return ""
         return f"the log does not say whether the robot {self._unsure_words}"
@@ -117,7 +117,7 @@ class MissionPast:
 
     @property
     def answers(self) -> tuple[str, ...]:
-        """The possible answers if the unsure step is a question; empty otherwise."""
+        """The options of the robot's question, if the unsure step is a question; empty otherwise."""
         return () if self.unsure is None else tuple(option.text for option in self.unsure.options)
 
     def resolve(self, *, happened: bool, answer: str = "") -> MissionPast:
@@ -142,13 +142,13 @@ class MissionPast:
         return replace(self, trace=trace, unsure=None, testimony=testimony)
 
     def add_to(self, room_map: RoomMap | None, place: str) -> tuple[RoomMap, str]:
-        """Return a map with these steps, and `place`, or if that is empty the robot's last known place."""
+        """Return the map with these steps added, and `place`, or the last known place if it is empty."""
         place = place or self.place
         known = RoomMap((place,), place, guessed=True) if room_map is None else room_map
         return replace(known, start=known.room(place) or known.start, past=self.trace), place
 
     def data(self) -> dict[str, object]:
-        """Convert the past to the data of a log event."""
+        """Return the data of the `past` event that a continuation writes to its log."""
         return {
             "continues": self.mission,
             "why": self.why,
@@ -174,7 +174,7 @@ def read_past(
     """
     summary = MissionSummary.read(folder)
     if robot_kind not in {"", summary.robot}:
-        raise UserError(f"mission {summary.id} ran on the robot {summary.robot}, not {robot_kind}")
+        raise UserError(f"mission {summary.id} ran on {summary.robot} and cannot continue on {robot_kind}")
     expect_rest(folder)
     events = read_events(folder)
     before: LogLine = next((line for line in events if line["event"] == "past"), {})
@@ -190,7 +190,7 @@ def read_past(
     except UserError:
         raise
     except (AttributeError, LookupError, TypeError, ValueError, re.error):
-        sentence = "the log does not fit the skills; name the files of own skills with --skills"
+        sentence = "the log does not match the known skills; name the files of own skills with --skills"
         raise UserError(sentence, file=folder) from None
     return MissionPast(
         summary.id,
@@ -216,9 +216,9 @@ def expect_rest(folder: Path) -> None:
         raise UserError(f"mission {summary.id} is done; there is nothing to continue")
     rest = find_rest(folder)
     if rest is not None:
-        mend = "can be continued instead" if rest.has_ended else "is doing it"
+        mend = "can be continued instead" if rest.has_ended else "is at work"
         mend = "is done" if rest.state is MissionState.DONE else mend
-        raise UserError(f"mission {summary.id} was continued already; mission {rest.id} {mend}")
+        raise UserError(f"mission {summary.id} was already continued by mission {rest.id}, which {mend}")
 
 
 def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> None:
@@ -228,7 +228,7 @@ def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> N
     lacks = next((name for name in had if name not in here), None)
     if lacks is not None:
         where = f'ran on another map, with the room "{shortened(lacks)}"'
-        raise UserError(f"mission {mission} {where}; give the same --world as then, or none if it had none")
+        raise UserError(f"mission {mission} {where}; give the same --world again, or leave it out")
 
 
 def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[LoggedRobot, Event | None]:
@@ -281,7 +281,7 @@ class LoggedRobot(SimulatedRobot):
         """Return None, since a log does not list the objects in a room."""
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Return a skill's logged result and record its event, or raise RobotError if it did not succeed."""
+        """Return a skill's logged result and record its event, or raise RobotError if the skill failed."""
         if self.end["event"] not in DONE_EVENTS:
             raise RobotError(self.end["event"], "the skill failed or was cancelled")
         row, result = self.skills[skill], self.end.get("result")
@@ -299,7 +299,7 @@ class LoggedRobot(SimulatedRobot):
 
 
 def arguments_in(line: LogLine, skills: SkillTable) -> list[Argument]:
-    """Return the arguments of a skill call in a log."""
+    """Return the arguments of the skill call in a log line."""
     given = zip(skills[line["skill"]].parameters, line["arguments"].values(), strict=True)
     listed = [to_options(value) if parameter.is_options else value for parameter, value in given]
     return [tuple(value) if isinstance(value, list) else value for value in listed]

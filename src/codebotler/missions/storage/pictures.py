@@ -30,9 +30,9 @@ class PictureStore:
         if kind is None:
             return _explain_loss(f"its {len(data):,} bytes are neither JPEG nor PNG")
         if len(data) > MAX_STORED_PICTURE_BYTES:
-            return _explain_loss(f"it has {len(data):,} bytes; the limit is {MAX_STORED_PICTURE_BYTES:,}")
+            return _explain_loss(f"its {len(data):,} bytes exceed the limit of {MAX_STORED_PICTURE_BYTES:,}")
         if self._bytes + len(data) > MAX_MISSION_PICTURE_BYTES:
-            return _explain_loss(f"the limit for a mission is {MAX_MISSION_PICTURE_BYTES:,} bytes")
+            return _explain_loss(f"all pictures of a mission may have {MAX_MISSION_PICTURE_BYTES:,} bytes")
         name = f"{PICTURE_FOLDER}/{self._count + 1}.{kind}"
         write_whole(self._folder / name, data)
         self._count += 1
@@ -45,7 +45,7 @@ def _explain_loss(why: str) -> dict[str, str]:
 
 
 def read_picture(folder: Path, line: Mapping[str, Any]) -> tuple[str, bytes] | None:
-    """Return the file extension and the bytes of an event's picture, or None if it has none."""
+    """Return the file extension and the bytes of an event's picture, or None if there is none to read."""
     name = line.get("file")
     if line["event"] != "picture" or not isinstance(name, str) or not _PICTURE_PATH.fullmatch(name):
         return None

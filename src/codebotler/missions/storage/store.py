@@ -30,11 +30,7 @@ _MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d{1,6})?", re.ASCII)
 
 
 def read_missions(home: Path, most: int | None = None) -> list[MissionSummary]:
-    """Read the summaries of all missions, or of the last `most` ones, oldest first.
-
-    Raises:
-        UserError: a summary is damaged.
-    """
+    """Read the last `most` summaries, or all, oldest first. Raise UserError if a summary is damaged."""
     folders = _mission_folders(home)[-most if most else 0 :]
     return sorted(map(MissionSummary.read, folders), key=lambda summary: (summary.created, summary.id))
 
@@ -59,12 +55,12 @@ def find_rest(folder: Path) -> MissionSummary | None:
 
 
 def rests_in(known: Sequence[MissionSummary]) -> dict[str, MissionSummary]:
-    """Return the missions that ran to continue another mission, each by the ID of the continued one."""
+    """Return a dict from the ID of each continued mission to the mission that ran to continue it."""
     return {one.continues: one for one in known if one.if_tool_dies and one.continues}
 
 
 def last_rest(mission: str, rests: Mapping[str, MissionSummary]) -> MissionSummary | None:
-    """Return the last in the chain of missions that continued a mission, given the result of `rests_in`."""
+    """Return the last mission in the chain that continues `mission`, or None. `rests` is from `rests_in`."""
     rest, seen = rests.get(mission), {mission}  # IDs are local times, which tell no order
     while rest is not None and rest.id in rests and rest.id not in seen:
         seen.add(rest.id)
@@ -73,12 +69,12 @@ def last_rest(mission: str, rests: Mapping[str, MissionSummary]) -> MissionSumma
 
 
 def rest_text(rest: MissionSummary | None) -> str:
-    """Say which mission did the rest, as in `continued by mission 20260102-120000 (done)`; "" if none did."""
+    """Return words such as `continued by mission 20260102-120000 (done)`, or "" if `rest` is None."""
     return "" if rest is None else f"continued by mission {rest.id} ({rest.state})"
 
 
 def recover_missions(home: Path) -> list[MissionSummary]:
-    """Close and report missions whose process died, but skip damaged missions."""
+    """Mark missions as interrupted if their process has ended, report them on stderr, and return them."""
     found: list[MissionSummary] = []
     for folder in _mission_folders(home):
         try:
@@ -94,7 +90,7 @@ def recover_missions(home: Path) -> list[MissionSummary]:
 
 
 def find_interrupted(home: Path) -> list[MissionSummary]:
-    """Close and return missions whose process died. Add the last that ran if it was interrupted earlier."""
+    """Call `recover_missions`. Return its missions, and the last that ran if it was interrupted earlier."""
     found = recover_missions(home)
     with suppress(UserError):
         ran = [one for one in read_missions(home, RECENT_MISSIONS) if one.if_tool_dies]

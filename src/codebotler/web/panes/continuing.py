@@ -62,7 +62,7 @@ class ContinueButton(Button):
         def answer(*, happened: bool, answer: str = "") -> None:
             dialog.close()
             if self._console.session is not before:
-                raise MissionError("another mission has begun meanwhile")
+                raise MissionError("another mission has begun since you were asked; nothing was continued")
             self._begin(past.resolve(happened=happened, answer=answer))
 
         with ui.dialog() as dialog, ui.card().classes("pane"):
@@ -90,24 +90,24 @@ class ContinueButton(Button):
 
 
 def has_rest(view: SessionView) -> bool:
-    """Return whether a mission ended early, and it or the mission that it continues had begun to run."""
+    """Return whether a mission ended early after it, or a mission that it continues, had begun to run."""
     has_past = view.progress.has_begun or view.past is not None
     is_early = view.state in EARLY_ENDS or view.state is None  # without a state, the robot was busy
     return view.is_over and is_early and has_past
 
 
 def is_unfinished(view: SessionView) -> bool:
-    """Return whether the mission's own program began to run on the robot, but ended early."""
+    """Return whether the program of this mission itself began to run on the robot, but ended early."""
     return has_rest(view) and view.progress.has_begun
 
 
 def can_be_continued(summary: MissionSummary) -> bool:
-    """Return whether a mission has run on the robot, or was to continue a mission that had."""
+    """Return whether a mission ran on the robot, or was meant to continue one that ran."""
     return bool(summary.if_tool_dies or summary.continues)
 
 
 def draw_past(past: MissionPast) -> None:
-    """Draw the steps of the mission that this one continues."""
+    """Draw the steps of the earlier mission `past`, which the current mission continues."""
     PlainText("h3", "Done so far")
     steps = [*zip(past.steps, past.trace, strict=True)]
     if earlier := steps[-_MAX_STEPS:-MAX_OPEN_STEPS]:

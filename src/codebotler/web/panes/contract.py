@@ -12,7 +12,7 @@ from codebotler.web.frame import PlainText
 
 
 def draw_contract(skills: SkillTable, contracts: tuple[Contract, Contract | None]) -> None:
-    """Draw what the program may do at most, and what of this is new compared with the draft before it."""
+    """Draw the first contract, and what is new compared with the second (of the draft before), if any."""
     contract, earlier = contracts
     PlainText("h3", "What it may do at most")
     sentence = contract_sentence(contract, skills)

@@ -66,7 +66,7 @@ class InstructionPane:
         return str(self._model.value or "")
 
     async def load(self) -> None:
-        """Add the examples and the recent instructions."""
+        """Read the examples and the recent instructions, and add them to the pane."""
         shown = await asyncio.to_thread(examples, self._console)
         if not self._examples.is_deleted:  # the page may have been closed in the meantime
             some = ", such as the examples below." if shown else ", and none of them fits these rooms."
@@ -128,7 +128,7 @@ class InstructionPane:
 
 
 def examples(console: Console) -> list[str]:
-    """Return short recorded instructions that use different skills and only rooms that exist here."""
+    """Return up to 4 short recorded instructions for this world, which use different skills."""
     room_map = None if console.world is None else RoomMap.of(console.world)
     known = known_instructions(room_map)
     found: dict[frozenset[str], str] = {}

@@ -99,7 +99,7 @@ def state_words(summary: MissionSummary, view: SessionView) -> str:
 
 
 def has_words(summary: MissionSummary, state: str, words: Sequence[str]) -> bool:
-    """Whether all words, in lower case, are in the ID, state, robot, instruction, program or reason."""
+    """Whether each of `words` (in lower case) is in the ID, state, robot, instruction, program or reason."""
     if not words:
         return True
     program = summary.program[:MAX_SEARCHED_CHARACTERS]

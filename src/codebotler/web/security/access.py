@@ -47,7 +47,7 @@ class Role(StrEnum):
 
 
 class TooManyTriesError(Exception):
-    """Raised when an address has sent too many invalid tokens. For a while, even a valid one is refused."""
+    """Raised when an address has sent too many invalid tokens. Even a valid one is refused for a while."""
 
 
 def new_token() -> str:
@@ -77,13 +77,13 @@ class Access:
         open_to_all: bool = False,
         is_private: bool = True,
     ) -> Access:
-        """Use the given tokens, and create those that are None. Raise UserError if a token is unsafe."""
+        """Use the given tokens, and random ones for None. Raise UserError if this would be unsafe."""
         options = {Role.OPERATOR: operator, Role.FACE: face, Role.AGENT: agent}
         given = [token for token in options.values() if token is not None]
         if open_to_all and (any(given) or not is_private):
             raise UserError("--no-token cannot be combined with --host, --behind-proxy or your own tokens")
         if any(len(token) < MIN_TOKEN_LENGTH for token in given):
-            raise UserError(f"this token is too short; use at least {MIN_TOKEN_LENGTH} characters")
+            raise UserError(f"a token is too short; use at least {MIN_TOKEN_LENGTH} characters")
         if len({*given}) < len(given):
             raise UserError("two roles have the same token; choose another token for one of them")
         unguessable = frozenset(role for role, token in options.items() if token is None)
@@ -91,7 +91,7 @@ class Access:
         return cls(of_operators, face or new_token(), agent or new_token(), unguessable)
 
     def of_token(self, token: str, address: str) -> Role | None:
-        """Return a token's role, or None for an invalid token, which counts towards the address's limit."""
+        """Return a token's role, or None. Raise TooManyTriesError after many invalid ones from `address`."""
         role = self._of(token, lambda known: known)
         if role in self.unguessable:
             return role
@@ -116,7 +116,7 @@ class Access:
 
     @property
     def path(self) -> str:
-        """A secret path for the page and its cookie, which servers on other ports would otherwise receive."""
+        """The secret path of the page, so that servers on other ports do not receive the page's cookies."""
         return f"/{self._cookie_value('path')[:SECRET_BYTES]}"
 
     def _cookie_value(self, token: str) -> str:
@@ -149,7 +149,7 @@ def read_cookie_secret(home: Path) -> bytes:
             os.link(new.name, file)  # whole at once, since another process may start, too
     secret = file.read_bytes()
     if len(secret) != SECRET_BYTES:
-        raise UserError("this is not the secret of the page's cookies; remove the file", file=file)
+        raise UserError("this file does not contain a valid cookie secret; remove the file", file=file)
     return secret
 
 
@@ -196,6 +196,6 @@ class PageAddress:
 
     @property
     def hosts(self) -> frozenset[str]:
-        """The host names that requests may have, without ports."""
+        """The host names that requests may name, in lower case and without ports."""
         named = {name.lower() for name in (self.host, *self.names)} | {one.name for one in self.proxies}
         return LOCAL_HOST_NAMES | named | (set() if self.is_loopback else {socket.gethostname().lower()})

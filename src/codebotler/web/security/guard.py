@@ -60,7 +60,7 @@ _NO_SCRIPT = "script-src 'none'"  # pages with this policy get no nonce
 
 _NO_CONTROL_CHARACTERS = "there is no such page; addresses cannot contain control characters"
 NO_PAGE = "there is no such page"
-_WRONG = "this token is wrong"
+_WRONG = "this token is wrong; use the printed link or token"
 _OTHER_SITE = (
     "this request came from another site; behind a proxy, use --behind-proxy and keep the Host header"
 )
@@ -163,7 +163,7 @@ class Guard:
         changes = is_socket or request.scope["method"] not in _SAFE_METHODS
         from_browser = "cookie" in headers or is_socket
         if changes and origin is None and from_browser and "authorization" not in headers:
-            raise RefusedError(HTTPStatus.FORBIDDEN, "browsers must send the Origin header")
+            raise RefusedError(HTTPStatus.FORBIDDEN, "the request has no Origin header; a browser sends one")
         navigates = headers.get("sec-fetch-mode") == "navigate"
         if headers.get("sec-fetch-site") in {"cross-site", "same-site"} and not navigates:
             raise RefusedError(HTTPStatus.FORBIDDEN, _OTHER_SITE)

@@ -63,7 +63,7 @@ class OuterAddress:
         return f"{self.scheme}://{self.host}{self.prefix}/"
 
     def seen_from_outside(self, scope: Scope) -> dict[str, Any]:
-        """Return a request with the scheme and path that the browser used, such as https and `/robot/api`."""
+        """Return a copy of a request with the browser's scheme and path, such as https and `/robot/api`."""
         path, raw = scope["path"], scope.get("raw_path") or b""
         if self.prefix and path != self.prefix and not path.startswith(f"{self.prefix}/"):
             path, raw = self.prefix + path, self.prefix.encode() + raw
@@ -104,7 +104,7 @@ def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
 
 
 def addresses_by_host(addresses: Iterable[OuterAddress]) -> Mapping[str, OuterAddress]:
-    """Index addresses by Host header, with and without the default port, which some clients add."""
+    """Return addresses by Host header: with and without the default port, which some clients add."""
     found: dict[str, OuterAddress] = {}
     for address in addresses:
         found[address.host] = address
@@ -114,12 +114,12 @@ def addresses_by_host(addresses: Iterable[OuterAddress]) -> Mapping[str, OuterAd
 
 
 def prefix_of(scope: Mapping[str, Any]) -> str:
-    """Return what precedes our paths in the browser: a proxy's prefix, and the secret path, if used."""
+    """Return what precedes our paths in the browser: a proxy's prefix and, if used, the secret path."""
     prefix: str = scope.get("app_root_path", scope.get("root_path", ""))  # a mounted app changes root_path
     return prefix
 
 
 def path_of(scope: Mapping[str, Any]) -> str:
-    """Return the path of a request without this prefix, such as `/missions`."""
+    """Return the path of a request without the prefix from `prefix_of`, such as `/missions`."""
     path: str = scope["path"]
     return path.removeprefix(prefix_of(scope))
