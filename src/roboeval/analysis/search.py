@@ -33,7 +33,7 @@ class TraceMatch:
 
 
 def match_row(row: Mapping[str, Any], query: TraceQuery) -> TraceMatch:
-    """Return the worlds in which a completion matches a query, given its row."""
+    """Return the worlds in which a completion's row matches a query, and those that it cannot decide."""
     formula = query.formula
     worlds, cut = [], []
     verdicts = [*_verdicts_in_scope(row, query)]

@@ -33,7 +33,7 @@ def model_of(run: JudgedRun) -> str | None:
 
 
 def recognised_models(runs: Iterable[JudgedRun]) -> list[str]:
-    """Say in a sentence which runs are by models of the paper. Return nothing if none is."""
+    """Return a sentence that lists the runs by models of the paper, or an empty list if there are none."""
     pairs = [f"{run.name} is {model}" for run in runs if (model := model_of(run)) is not None]
     return [f"Recognised by name as models of the paper: {', '.join(pairs)}."] if pairs else []
 
@@ -63,7 +63,7 @@ def overall_mean(model: str, tasks: Sequence[str]) -> float | None:
 
 
 def causes(model: str) -> Causes:
-    """Return the published causes of a model's failures."""
+    """Return the published causes of a model's failures, given the paper's name for the model."""
     at, classes, kinds = _column(model), published()["classes"], published()["kinds"]
     return Causes(
         {name: shares[at] / 100 for name, shares in classes.items()},

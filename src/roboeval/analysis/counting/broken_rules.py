@@ -26,7 +26,7 @@ class BrokenRules:
 
 
 def count_broken_rules(table: pl.DataFrame, without: pl.DataFrame | None = None) -> BrokenRules:
-    """Count the programs that break house rules.
+    """Count the programs that break house rules, and compute how much the rules change pass@1.
 
     Args:
         table: The results of an evaluation with house rules, from `load_results`.

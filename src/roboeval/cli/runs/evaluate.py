@@ -82,7 +82,7 @@ def evaluate(
             judged_by = judged_by.with_worlds(worlds, seed)
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
         if left:
-            note(f"not judged because they have no ablation: {', '.join(left)}")
+            note(f"tasks that are not judged because they have no ablation: {', '.join(left)}")
         tally, failed, table = Tally(), None, None
         if rules is not None:
             from roboeval.evaluation.runs.table import TableBuilder  # imports polars, which loads slowly
