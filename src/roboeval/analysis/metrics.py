@@ -49,7 +49,7 @@ class Estimate:
         mean: The mean of the values.
         low: The lower end of the interval.
         high: The upper end of the interval.
-        over: What the interval assumes to be a random sample.
+        over: The unit, `prompts` or `tasks`, that the interval assumes to be sampled at random.
     """
 
     mean: float
@@ -63,7 +63,7 @@ class Estimate:
         return self.high - self.low > ROUNDING_ERROR and (self.low, self.high) not in (SHARE, DIFFERENCE)
 
     def ends(self, form: str = ".3f") -> str:
-        """Format the ends with the format `form`, such as `0.310 to 0.540`, or say why they are unknown."""
+        """Format both ends with `form`, such as `0.310 to 0.540`, or say why the interval is unknown."""
         if self.high - self.low <= ROUNDING_ERROR:
             return f"unknown: no variation between {self.over}"
         if not self.is_known:

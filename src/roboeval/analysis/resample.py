@@ -21,7 +21,7 @@ THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
 
 @dataclass(frozen=True)
 class CheckedPrompt:
-    """Counts the checked and judged completions of one prompt."""
+    """The numbers of a prompt's completions that the check accepts, that run without error, and that pass."""
 
     task: str
     prompt: int

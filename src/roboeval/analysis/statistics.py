@@ -79,7 +79,7 @@ def p_by_signs(clusters: Clusters, *, seed: int = BOOTSTRAP_SEED, draws: int = 1
 
 @dataclass(frozen=True)
 class SampleSizes:
-    """The sample sizes that detect a difference with 80% power. None if they cannot be computed."""
+    """The sample sizes that detect a difference with 80% power. A size is None if it cannot be computed."""
 
     completions: int | None  # number per prompt and model, if only these prompts matter
     prompts: int | None  # number of similar prompts, with as many completions per prompt as now

@@ -55,7 +55,7 @@ def expect_judged(selection: Selection, judged: Iterable[CompletionKey]) -> None
     """Raise UserError if no completion in this part of a run was judged."""
     if not any(key[: len(selection)] == selection for key in judged):
         part = "/".join(map(str, selection))
-        raise UserError(f"this run has no judged completion of {part}; `roboeval show RUN` lists its tasks")
+        raise UserError(f"no completion of {part} is judged in this run; `roboeval show RUN` lists its tasks")
 
 
 def names_completion(text: str) -> bool:

@@ -37,7 +37,7 @@ def tasks(
         start(new, suite)
         return
     if accepted and not lint:
-        fail("--accepted needs --lint; add it")
+        fail("--accepted needs --lint; add --lint")
     known = load(suite)
     if lint:
         chosen = list(known.tasks.values()) if task is None else [known.task(task)]

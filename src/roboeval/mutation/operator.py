@@ -25,7 +25,7 @@ class Context:
 
     @classmethod
     def of(cls, worlds: Sequence[World], prompts: Sequence[str] = ()) -> Context:
-        """Collect the names of rooms, people and things from the worlds of a task."""
+        """Collect the names of rooms, people and things from a task's worlds, and keep its prompts."""
         starts = {world.robot for world in worlds}
         rooms = [room for world in worlds for room in world.rooms]
         owners = (re.fullmatch(r"(\w+)'s .+", room.name) for room in rooms)

@@ -47,7 +47,7 @@ class ProgramTree:
                 yield node
 
     def steps(self, *skills: str) -> Iterator[tuple[ast.Expr, ast.Call]]:
-        """Yield each statement that is just a call of a named skill, such as `say("Hi")`, and the call."""
+        """Yield each statement that only calls one of the skills, such as `say("Hi")`, and the call."""
         for node in self.nodes:
             match node:
                 case ast.Expr(ast.Call() as call) if skill_of(call) in skills:

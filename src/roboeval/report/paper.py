@@ -17,7 +17,7 @@ PAPER_SUITE = "paper"
 
 @cache
 def published() -> dict[str, Any]:
-    """Read the published results of the paper."""
+    """Read the published results of the paper: pass@1 by task and prompt, and the causes of failures."""
     data: dict[str, Any] = json.loads(Path(__file__).with_name("published.json").read_text())
     return data
 
@@ -45,7 +45,7 @@ def uses_authors_prompts(run: JudgedRun) -> bool:
 
 
 def cell(model: str, task: str, prompt: int) -> float | None:
-    """Return the pass@1 that the paper gives for a model on one of the authors' prompts, or None."""
+    """Return a model's published pass@1 on one of the authors' prompts (from 0), or None if there is none."""
     rows = published()["pass_at_1"].get(task, [])
     return rows[prompt][_column(model)] if prompt < len(rows) else None
 

@@ -95,7 +95,7 @@ class JudgedRun:
 
     @cached_property
     def checked(self) -> tuple[CheckedPrompt, ...]:
-        """How many completions of each prompt pass the check, the task or both. Empty if any is unchecked."""
+        """The counts of each prompt's completions by check and verdict. Empty if any program is unchecked."""
         return () if self.table["accepted"].null_count() else count_by_prompt(self.table)
 
 
@@ -113,7 +113,7 @@ def runs_to_draw(runs: Sequence[JudgedRun]) -> tuple[list[JudgedRun], list[str]]
 
 
 def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
-    """Return sentences on how much of each run was judged, or a single one if this is equal for all runs."""
+    """Return sentences on how much of each run was judged, or one sentence if this is equal for all runs."""
     sentences: dict[str, list[str]] = {}
     for run in runs:
         sentences.setdefault(run.coverage_sentence, []).append(run.name)
@@ -168,7 +168,7 @@ def _extend_duplicates(names: Sequence[str], longer: Sequence[str]) -> list[str]
 
 
 def price_runs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> list[JudgedRun]:
-    """Give each run the price for its folder, name or model. Raise UserError if no run has a price's name."""
+    """Give each run the price for its folder, name or model. Raise UserError if a price fits no run."""
     names = [(run.folder, run.name, run.model or "") for run in runs]
     for model in prices:
         if not any(model in those for those in names):

@@ -59,7 +59,7 @@ def sections(
     with_published: bool = False,
     command: str = "",
 ) -> list[Section]:
-    """Build all non-empty sections of a report on runs of one suite. `command` is how to reproduce it."""
+    """Return the non-empty sections of a report on runs of one suite. `command` is its command line."""
     found = [
         glance(runs),
         scores.results(runs),

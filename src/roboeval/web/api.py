@@ -34,7 +34,7 @@ EvaluationQuery: TypeAlias = Annotated[
 
 
 def router(store: RunStore, all_runs: RunList) -> APIRouter:
-    """Create the routes below `/api/runs`."""
+    """Create the routes below `/api/runs`, which return runs and completions as JSON, and reports."""
     api = APIRouter(
         prefix="/api/runs",
         tags=["runs"],

@@ -21,7 +21,7 @@ from roboeval.web.snapshot import Snapshot
 MAX_SNAPSHOTS = 16  # number of evaluations kept in memory
 REPORT_PAGE, MAX_REPORT_BYTES = "index.html", 20_000_000  # file name and maximum size of a report
 REST_FACTOR = 10  # pause between two reads of a run, as a multiple of the time that a read takes
-OUTSIDE_FOLDER = "is a link that leads outside the folder of runs; replace it by the files themselves"
+OUTSIDE_FOLDER = "is a link that leads outside the folder of runs; replace the link by its target"
 
 FileStamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
 
@@ -43,7 +43,7 @@ class RunStore:
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """Return a run's latest snapshot. `key` names an evaluation, by default the first but no ablation."""
+        """Return a run's latest snapshot. `key` names an evaluation, by default one of all requirements."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
@@ -51,7 +51,7 @@ class RunStore:
         return self._reader(name, None).version()
 
     def report(self, name: str, part: str = REPORT_PAGE) -> bytes:
-        """Read the page or another part of a run's report. Raise UserError if it is absent or too large."""
+        """Read a file of a run's report, such as its page. Raise UserError if it is absent or too large."""
         path = self._reader(name, None).folder / "report" / part
         try:
             if _stamp(path, self.folder.resolve()) is not None:

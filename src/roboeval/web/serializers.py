@@ -22,7 +22,7 @@ MAX_SUITE_NAME, MAX_FAILURE_REASON = 120, 300
 
 
 class RunState(StrEnum):
-    """The progress of a run."""
+    """The state of a run, as the pages and the API name it."""
 
     READING = "being read"
     GENERATING = "being generated"

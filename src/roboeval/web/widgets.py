@@ -88,7 +88,7 @@ class ProgramView(Element, component="static/code.js"):
 
 
 def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = None) -> None:
-    """Show the state of a run, given its `run_data`, on a label and, if given, its progress on a bar."""
+    """Show a run's state on a label and, if there is a bar, its progress. `data` is the run's `run_data`."""
     state = str(data["state"])
     label.say(state)
     label.classes(replace=f"state state-{state.replace(' ', '-')}")

@@ -30,7 +30,7 @@ class TaskChanges:
 
 @dataclass(frozen=True)
 class VerdictChanges:
-    """The effect of judging a run with a second suite."""
+    """How the verdicts on a run change if a second suite judges it."""
 
     name: str
     suites: tuple[str, str]

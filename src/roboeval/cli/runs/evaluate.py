@@ -95,7 +95,7 @@ def evaluate(
             about = {} if opened.run is None else about_of(opened.run)
             scope = JudgingScope.of(opened.completions, wanted, about, judged_by)
             if scope.total == 0:
-                fail(f"{source}: contains no completion for {tasks or 'a task with an ablation'}")
+                fail(f"{source}: contains no completion of {tasks or 'a task to judge'}; name another source")
             if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
                 run.keep(opened.completions)
             running = engine_for(scope.total)

@@ -117,7 +117,7 @@ def read_options(
     base_url: BaseUrlOption = None,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> GenerationRequest:
-    """Convert the options that `generate` and `run` share to a request."""
+    """Read the options that `generate` and `run` share. Exit with status 2 if they do not fit together."""
     from codebotler.models.open import NOT_CALLING, choose_model, kind_of
     from roboeval.evaluation.agents.conversation import TurnLimits
     from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan

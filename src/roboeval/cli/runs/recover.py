@@ -1,4 +1,4 @@
-"""Defines the command recover, which measures how a model does the rest of missions that ended early."""
+"""Defines the command recover, which measures how a model continues missions that ended early."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def recover(
     json: JsonOption = False,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
-    """Let skill calls fail, and judge how a model does the rest.
+    """Let skill calls fail, and judge how a model continues the missions.
 
     Each call of the first right program of each task fails once, in each world.
     """

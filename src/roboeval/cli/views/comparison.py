@@ -70,7 +70,7 @@ def comparison_view(
 
 
 def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
-    """Return a view of the verdicts that a second suite changes, with up to `most` groups of each kind."""
+    """Return a view of the verdicts that a second suite changes. A list shows up to `most` groups."""
     parts: list[RenderableType] = [Text(visible(sentence), "bold") for sentence in sentences(found)]
     parts += [Text(), _scores(found)]
     for one in found:

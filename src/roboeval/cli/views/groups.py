@@ -32,7 +32,7 @@ def found_view(
     groups: int,
     is_search: bool,
 ) -> RenderableType:
-    """Return a view of failure groups (`shown` of `groups`), after a search with what it found by task."""
+    """Return a view of the groups `shown`. If `is_search`, it starts with what was found in each task."""
     failed = sum(one.key not in passed for one in found)
     parts: list[RenderableType] = []
     if is_search:

@@ -55,7 +55,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def render(figure: Figure) -> dict[str, bytes]:
-    """Return a figure as files by ending (`png`, `pdf`, `svg`), without dates and versions in them."""
+    """Return the content of a figure's files by ending (`png`, `pdf`, `svg`), without dates or versions."""
     if (layout := figure.get_layout_engine()) is not None:
         layout.execute(figure)
         figure.set_layout_engine(None)

@@ -45,7 +45,7 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table that compares tasks in which the robot must come back and report with all others."""
+    """Build the table of pass rates and failures of tasks where the robot must report back, and of others."""
     reporting = {one.name for one in runs[0].suite.tasks.values() if REPORT_ABILITY in one.abilities}
     rows: list[list[Cell]] = []
     for run in runs:
