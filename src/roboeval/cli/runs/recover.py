@@ -35,7 +35,7 @@ def recover(
     json: JsonOption = False,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
-    """Let skill calls fail, and judge how a model continues the missions.
+    """Let skill calls fail, and judge how a model continues.
 
     Each call of the first right program of each task fails once, in each world.
     """
