@@ -56,7 +56,7 @@ class FailureGroup:
 
     @property
     def why(self) -> str:
-        """A sentence that explains why the representative fails."""
+        """A sentence that explains why the representative fails. Empty if there is no explanation."""
         if self.reason["explanation"] is not None:
             return str(self.reason["explanation"])
         return error_sentence(self.reason) if self.reason["error"] else ""
@@ -82,7 +82,7 @@ def group_failures(failed: Iterable[Row], programs: Mapping[CompletionKey, str])
 
 
 def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterator[FailureGroup]:
-    """Explain the failure of each group, and find the smallest fix for it."""
+    """Yield a description of each group, with the reason for its failure and the smallest fix."""
     programs = results.programs
     candidates = cache(partial(_passing_in, results))
     for rows in groups:
@@ -196,7 +196,7 @@ def similarity(one: Counter[str], other: Counter[str]) -> float:
 
 
 def passing_programs(named: Iterable[tuple[str, str]]) -> dict[ProgramLines, str]:
-    """Map the lines of each distinct program to its name. A program with several names keeps the first."""
+    """Return a dict from lines to name, given (name, program) pairs. Of equal programs, keep the first."""
     first: dict[ProgramLines, str] = {}
     for name, program in named:
         first.setdefault(_split(program), name)
@@ -208,7 +208,7 @@ def _split(program: str) -> ProgramLines:
 
 
 def shortest_fix(program: str, candidates: Mapping[ProgramLines, str]) -> Fix | None:
-    """Return the fix that changes the fewest lines, or None if there are no candidates."""
+    """Return the smallest difference to a passing program (a candidate), or None if there are none."""
     lines = _split(program)
     counts = Counter(lines)
 

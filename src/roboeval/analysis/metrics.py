@@ -49,7 +49,7 @@ class Estimate:
         mean: The mean of the values.
         low: The lower end of the interval.
         high: The upper end of the interval.
-        over: What the interval assumes to be a random sample.
+        over: The unit, `prompts` or `tasks`, that the interval assumes to be sampled at random.
     """
 
     mean: float
@@ -63,7 +63,7 @@ class Estimate:
         return self.high - self.low > ROUNDING_ERROR and (self.low, self.high) not in (SHARE, DIFFERENCE)
 
     def ends(self, form: str = ".3f") -> str:
-        """Format the ends of the interval, or say why it is unknown."""
+        """Format both ends with `form`, such as `0.310 to 0.540`, or say why the interval is unknown."""
         if self.high - self.low <= ROUNDING_ERROR:
             return f"unknown: no variation between {self.over}"
         if not self.is_known:
@@ -78,7 +78,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class PromptScore:
-    """Counts the `n` judged and `c` passed completions of a prompt. Prompts are numbered from 0."""
+    """The numbers of judged (`n`) and passed (`c`) completions of a prompt. Prompts are numbered from 0."""
 
     task: str
     prompt: int
@@ -121,26 +121,25 @@ class TaskScore:
 
 
 def prompts_of(tasks: Iterable[TaskScore]) -> list[PromptScore]:
-    """Collect the scores of all prompts of the given tasks."""
+    """Return the scores of all prompts of the given tasks as one list."""
     return [prompt for task in tasks for prompt in task.prompts]
 
 
 def pass_at_1(tasks: Iterable[TaskScore]) -> dict[tuple[str, int], float]:
-    """Map each task and prompt to its pass@1."""
+    """Return pass@1 of each prompt. The key of prompt 0 of CountMen is `("CountMen", 0)`."""
     return {(p.task, p.prompt): p.pass_at(1) for p in prompts_of(tasks)}
 
 
 def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
     """Return the mean pass@k over all prompts, with its 95% interval over tasks.
 
-    Raises:
-        ValueError: If a prompt has fewer than k completions.
+    Raise ValueError if a prompt has fewer than k completions.
     """
     return over_tasks((prompt.task, prompt.pass_at(k)) for prompt in prompts_of(tasks))
 
 
 def over_tasks(values: Iterable[tuple[str, float]], *, within: tuple[float, float] = SHARE) -> Estimate:
-    """Return the mean of values, given with their tasks, and its 95% interval over tasks."""
+    """Return the mean of the values in (task, value) pairs, and its 95% interval over tasks."""
     by_task: dict[str, list[float]] = {}
     for task, value in values:
         by_task.setdefault(task, []).append(value)
@@ -160,7 +159,7 @@ def percent(share: float) -> str:
 
 
 def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
-    """Return thresholds, largest first, with the share of prompts that reach each (paper, section V.A)."""
+    """Return (threshold, share of values that reach it) pairs, largest threshold first (paper, V.A)."""
     thresholds = sorted({1.0, *(value for value in values if value > ROUNDING_ERROR)}, reverse=True)
     return [(threshold, share_at_least(values, threshold)) for threshold in thresholds]
 
@@ -191,7 +190,7 @@ def mean_of(clusters: Clusters) -> float:
 
 @lru_cache(maxsize=1024)
 def t_quantile(p: float, df: int) -> float:
-    """Return the quantile p >= 1/2 of Student's t distribution with `df` degrees of freedom."""
+    """Return the p-quantile of Student's t distribution with `df` degrees of freedom, for p >= 1/2."""
     # With angle = atan(t / sqrt(df)), the probability is a finite sum and the bisection has a bounded range.
     low, high = 0.0, math.pi / 2
     while low < (angle := (low + high) / 2) < high:

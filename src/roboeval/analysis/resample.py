@@ -21,7 +21,7 @@ THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
 
 @dataclass(frozen=True)
 class CheckedPrompt:
-    """Counts the checked and judged completions of one prompt."""
+    """The numbers of a prompt's completions that the check accepts, that run without error, and that pass."""
 
     task: str
     prompt: int
@@ -48,7 +48,7 @@ class Chances:
 
 
 def final_chances(prompt: CheckedPrompt, retries: int) -> Chances:
-    """Compute the exact probabilities for a prompt, assuming that all completions are equally likely.
+    """Compute the probabilities for a prompt, if each request returns one of its completions at random.
 
     A completion is final if it is accepted or if no retry is left. Without retries, the probability of
     passing equals the prompt's pass@1.
@@ -119,7 +119,7 @@ def accepted_after(prompts: Sequence[CheckedPrompt], most: int) -> list[float]:
 
 
 def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[str, Any]:
-    """Compute the data of the paper's two figures on rejection sampling (section VI)."""
+    """Return the results for each limit on retries, and those of each prompt, as JSON data for `--json`."""
     of_limits = [resample(prompts, retries) for retries in limits]
     return {
         "limits": [

@@ -14,7 +14,7 @@ from roboeval.evaluation.runs.traces import trace_of
 
 @dataclass(frozen=True)
 class TraceQuery:
-    """Selects the traces to search for by formula, task and world."""
+    """A search for traces by formula, task and world. A field that is None matches every trace."""
 
     formula: Formula | None = None  # None matches every trace
     negated: bool = False  # whether to find traces that do not satisfy the formula
@@ -33,7 +33,7 @@ class TraceMatch:
 
 
 def match_row(row: Mapping[str, Any], query: TraceQuery) -> TraceMatch:
-    """Return the worlds in which a completion matches a query, given its row."""
+    """Search a completion's row. Return the worlds that match, and those whose trace was not stored."""
     formula = query.formula
     worlds, cut = [], []
     verdicts = [*_verdicts_in_scope(row, query)]

@@ -35,7 +35,7 @@ def by_bootstrap(
     seed: int = BOOTSTRAP_SEED,
     draws: int = 10_000,
 ) -> Estimate:
-    """Return the mean of all values with a percentile interval from a cluster bootstrap.
+    """Return the mean of all values with a percentile interval from `draws` resamples of the clusters.
 
     Plain percentiles are too narrow for few clusters, so they are expanded by the ratio of Student's t to the
     normal distribution (Hesterberg's expanded percentile interval).
@@ -59,8 +59,8 @@ def by_bootstrap(
 def p_by_signs(clusters: Clusters, *, seed: int = BOOTSTRAP_SEED, draws: int = 100_000) -> float:
     """Return the p-value of a two-sided permutation test that flips the signs of whole clusters.
 
-    The test is exact for up to 20 clusters. For more, signs are sampled. With G clusters, p is at least
-    2 / 2**G, so a difference between few clusters cannot be significant.
+    The test is exact for up to 20 clusters. For more, `draws` flips are sampled. With G clusters, p is at
+    least 2 / 2**G, so a difference between few clusters cannot be significant.
     """
     sums = np.array([math.fsum(values) for values in clusters])
     observed = abs(float(sums.sum())) - ROUNDING_ERROR
@@ -79,7 +79,7 @@ def p_by_signs(clusters: Clusters, *, seed: int = BOOTSTRAP_SEED, draws: int = 1
 
 @dataclass(frozen=True)
 class SampleSizes:
-    """The sample sizes for 80% power, or None if the models do not differ."""
+    """The sample sizes that detect a difference with 80% power. A size is None if it cannot be computed."""
 
     completions: int | None  # number per prompt and model, if only these prompts matter
     prompts: int | None  # number of similar prompts, with as many completions per prompt as now

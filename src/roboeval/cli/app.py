@@ -41,7 +41,7 @@ app.command("import")(import_)
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the `roboeval` command with the arguments of this process."""
     with report_problems():
         obey(app, "roboeval")
 

@@ -21,7 +21,7 @@ Selection: TypeAlias = tuple[str, *tuple[int, ...]]
 
 
 def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
-    """Read a suite by name or folder, with optional files of house rules and additional skills."""
+    """Read a suite by name or folder, with a file of house rules and files of more skills, if given."""
     from codebotler.checking.house_rules.rooms import find_evasions
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.paper import SKILLS
@@ -41,7 +41,7 @@ def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = 
 
 
 def parse_selection(text: str, suite: Suite) -> Selection:
-    """Parse a part of a run: TASK, TASK/PROMPT or TASK/PROMPT/INDEX, such as `LunchTime/0/12`."""
+    """Parse TASK, TASK/PROMPT or TASK/PROMPT/INDEX, such as `LunchTime/0/12`. Raise UserError otherwise."""
     name, *numbers = text.removesuffix("/").split("/")
     if len(numbers) > 2 or not all(n.isascii() and n.isdecimal() and len(n) < 10 for n in numbers):  # noqa: PLR2004 - parts
         raise UserError(
@@ -55,7 +55,7 @@ def expect_judged(selection: Selection, judged: Iterable[CompletionKey]) -> None
     """Raise UserError if no completion in this part of a run was judged."""
     if not any(key[: len(selection)] == selection for key in judged):
         part = "/".join(map(str, selection))
-        raise UserError(f"no completion of {part} has been judged in this run")
+        raise UserError(f"no completion of {part} is judged in this run; `roboeval show RUN` lists its tasks")
 
 
 def names_completion(text: str) -> bool:
@@ -96,9 +96,9 @@ def open_run(
     completion: str | None = None,
     reuse_from: Results | None = None,
 ) -> Results:
-    """Read a judged run. If a completion is given, read only the rows of its task.
+    """Read a judged run. If a completion such as `LunchTime/0/12` is given, read only the rows of its task.
 
-    `reuse_from` is another evaluation of the same run.
+    `reuse_from` is another evaluation of the same run, whose completions need not be read again.
     """
     from roboeval.evaluation.runs.folder import evaluation_of
     from roboeval.evaluation.runs.results import read_results
@@ -133,18 +133,18 @@ def open_current(
     rules: Path | None = None,
     reuse_from: Results | None = None,
 ) -> Results:
-    """Read a judged run with `open_run`. Raise UserError if no completion is judged."""
+    """Read a run with `open_run`, and print what is not judged. Raise UserError if nothing is judged."""
     results = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from)
     unjudged = find_gap(results, suite_name, rules)
     if results.table.is_empty():
-        raise UserError(unjudged or "no completion has been judged", file=run)
+        raise UserError(unjudged or "the run contains no completions; `roboeval run` adds some", file=run)
     if unjudged:
         note(f"only judged completions count: {unjudged}")
     return results
 
 
 def find_gap(results: Results, suite_name: str, rules: Path | None) -> str | None:
-    """Return a sentence about the completions that are not judged yet, or None if there are none."""
+    """Return a sentence on how many completions are judged and how to go on, or None if all are judged."""
     from roboeval.evaluation.runs.completions import how_many
 
     count, total = len(results.places), results.scope.total

@@ -77,7 +77,7 @@ def mutate(
 
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
-    """Read the programs of the sources, and group them by task without dropping duplicates."""
+    """Read programs from runs or other sources, and return them by task. Duplicates are kept."""
     from roboeval.evaluation.runs.completions import name_of
     from roboeval.evaluation.runs.source import open_source
     from roboeval.mutation.mutants import Original

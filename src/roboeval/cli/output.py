@@ -26,7 +26,7 @@ Watched = TypeVar("Watched")
 
 
 def show_progress(items: Iterable[Watched], doing: str, total: int) -> Iterator[Watched]:
-    """Pass items through and show progress: a bar on a terminal, otherwise an occasional line."""
+    """Yield the items, and show how many of `total` are done: as a bar, or as lines without a terminal."""
     with progress_meter(doing, total) as update:
         for done, item in enumerate(items, 1):
             yield item
@@ -35,7 +35,7 @@ def show_progress(items: Iterable[Watched], doing: str, total: int) -> Iterator[
 
 @contextmanager
 def progress_meter(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, str], None]]:
-    """Show progress if `before` items are done. Yield a function that takes the number done and a remark."""
+    """Show progress from `before` to `total`. Yield a function to call with the number done and a remark."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     more_column = TextColumn("{task.fields[more]}", markup=False)

@@ -37,7 +37,7 @@ def tasks(
         start(new, suite)
         return
     if accepted and not lint:
-        fail("--accepted needs --lint; add it")
+        fail("--accepted needs --lint; add --lint")
     known = load(suite)
     if lint:
         chosen = list(known.tasks.values()) if task is None else [known.task(task)]
@@ -47,7 +47,7 @@ def tasks(
 
 
 def show(suite: Suite, task: str | None) -> None:
-    """Print the tasks of a suite, or one task."""
+    """Print a table of a suite's tasks or, if a task is named, its prompts, checks and worlds."""
     from roboeval.cli.views.tasks import suite_task_view, suite_view
     from roboeval.suites.load import known_suites
 
@@ -60,7 +60,7 @@ def show(suite: Suite, task: str | None) -> None:
 
 
 def start(task: str, suite: str) -> None:
-    """Create a task in the folder of a suite."""
+    """Create an example task with the name `task` in the folder of a suite, to be edited."""
     from roboeval.suites.load import known_suites
     from roboeval.suites.new_task import new_task
 

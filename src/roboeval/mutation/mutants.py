@@ -22,7 +22,7 @@ MUTATION_OPERATORS = tuple(chain.from_iterable(map(operators_in, OPERATOR_MODULE
 
 @dataclass(frozen=True)
 class Original:
-    """A program from which mutants are made if it is right."""
+    """A program from which mutants are made, provided that it passes the task's checks."""
 
     name: str
     program: str
@@ -35,13 +35,13 @@ class Original:
 
     @property
     def text(self) -> str:
-        """The text generated from the syntax tree, or the source if it does not parse."""
+        """The program formatted by `ast.unparse`, or its source if it does not parse."""
         return self.program if self.tree is None else self.tree.text
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """An original with one mistake that an operator has made."""
+    """A correct program into which a mutation operator has put one mistake."""
 
     operator: str
     original: Original
@@ -49,7 +49,7 @@ class Mutant:
 
     @cached_property
     def diff(self) -> str:
-        """The change as a unified diff, without file names."""
+        """The difference from the original as a unified diff, without file names."""
         before, after = self.original.text.splitlines(), self.program.splitlines()
         return "\n".join([*difflib.unified_diff(before, after, lineterm="")][2:]) + "\n"
 
@@ -60,7 +60,7 @@ class Mutant:
 
 
 def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, ...]:
-    """Collect the right solutions of a task and further programs. Equal syntax trees count once."""
+    """Return the right solutions of a task, then further programs. Of equal syntax trees, keep the first."""
     right = (Original(one.about, one.program) for one in solutions(task) if one.fails is None or one.right)
     distinct: dict[str, Original] = {}
     for original in chain(right, further):
@@ -85,7 +85,7 @@ def mutants(
 
 
 def sample_mutants(every: Iterable[Mutant], most: int, seed: int) -> tuple[Mutant, ...]:
-    """Sample up to `most` mutants evenly across operators, regardless of the order of `every`."""
+    """Sample up to `most` mutants evenly across operators. The order of `every` makes no difference."""
 
     def random_key(mutant: Mutant) -> bytes:
         return hashlib.sha256(f"{seed}\n{mutant.program}".encode(errors="surrogatepass")).digest()

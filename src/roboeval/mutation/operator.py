@@ -25,7 +25,7 @@ class Context:
 
     @classmethod
     def of(cls, worlds: Sequence[World], prompts: Sequence[str] = ()) -> Context:
-        """Collect the names from the worlds of a task."""
+        """Collect the names of rooms, people and things from a task's worlds, and keep its prompts."""
         starts = {world.robot for world in worlds}
         rooms = [room for world in worlds for room in world.rooms]
         owners = (re.fullmatch(r"(\w+)'s .+", room.name) for room in rooms)
@@ -65,7 +65,7 @@ def operators_in(module: ModuleType) -> Iterator[Operator]:
 
 
 def only_if(condition: Condition) -> Callable[[Mutate], Mutate]:
-    """Limit an operator to tasks that meet a condition, such as prompts that ask the robot to come back."""
+    """Return a decorator that limits an operator to tasks that meet a condition. Others get no edits."""
 
     def conditional(edits: Mutate) -> Mutate:
         @wraps(edits)

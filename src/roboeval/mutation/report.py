@@ -21,7 +21,7 @@ DESCRIPTIONS = {operator.name: operator.about for operator in MUTATION_OPERATORS
 
 
 def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
-    """Return a table with the score of each task."""
+    """Return a terminal table of the scores and counts of all tasks, headed by the name of the suite."""
     heads = "task", "worlds", "originals", "mutants", "killed", "equivalent", "survived", "score", "of all"
     table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
     for number, head in enumerate((*heads, "same traces", "crashes")):
@@ -39,7 +39,7 @@ def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
 
 
 def survivors_view(score: MutationScore) -> RenderableType:
-    """Return the surviving mutants of a task, each with its operator and diff."""
+    """Return a terminal view of a task's surviving mutants, each with its operator and diff."""
     parts: list[RenderableType] = []
     for number, mutant in enumerate(score.survivors, 1):
         origin = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
@@ -52,7 +52,7 @@ def survivors_view(score: MutationScore) -> RenderableType:
 
 
 def write_scores(scores: Sequence[MutationScore], folder: Path) -> None:
-    """Write scores.json, mutants/TASK.jsonl and survivors/TASK.yaml."""
+    """Write scores.json and, for each task, mutants/TASK.jsonl and survivors/TASK.yaml to a folder."""
     for score in scores:
         rows = b"".join(to_line(one.row()) for one in score.mutants)
         write_whole(folder / "mutants" / f"{score.task}.jsonl", rows)
@@ -65,7 +65,7 @@ def write_scores(scores: Sequence[MutationScore], folder: Path) -> None:
 
 
 def to_yaml(mutants: Iterable[Mutant]) -> str:
-    """Format mutants as a YAML list of equivalent mutants whose reasons are still empty."""
+    """Format mutants as YAML for solutions/TASK.yaml: equivalent mutants whose reasons are still empty."""
     entries = [{"operator": one.operator, "diff": one.diff, "because": ""} for one in mutants]
     listed = {"equivalent_mutants": entries}
     return yaml.dump(listed, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)

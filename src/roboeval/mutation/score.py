@@ -26,7 +26,7 @@ CHANGING_STATUSES = MutantStatus.KILLED, MutantStatus.SURVIVED, MutantStatus.EQU
 
 
 class MutantResult(NamedTuple):
-    """The status of a mutant and the reason for it."""
+    """The status of a mutant, with the world and the reason that decided it."""
 
     status: MutantStatus
     world: str | None = None  # the world in which it was killed
@@ -34,13 +34,13 @@ class MutantResult(NamedTuple):
 
 
 class TriedMutant(NamedTuple):
-    """A mutant and its result."""
+    """A mutant, and the result of running it in the worlds of its task."""
 
     mutant: Mutant
     result: MutantResult
 
     def row(self) -> dict[str, Any]:
-        """Return the mutant's row in mutants/TASK.jsonl."""
+        """Return the mutant and its result as JSON data, for a line of mutants/TASK.jsonl."""
         return {
             "operator": self.mutant.operator,
             "original": self.mutant.original.name,
@@ -52,7 +52,7 @@ class TriedMutant(NamedTuple):
 
 @dataclass(frozen=True)
 class MutationScore:
-    """Counts how many mutants of a task are killed by its checks."""
+    """The mutants of a task with their results, and the mutation score that follows from them."""
 
     task: str
     worlds: int
@@ -66,12 +66,12 @@ class MutationScore:
 
     @property
     def score(self) -> float | None:
-        """The share of mutants that are killed, not counting equivalent ones."""
+        """The share of killed mutants among the killed and surviving ones, or None if there are none."""
         return self._killed_of(MutantStatus.KILLED, MutantStatus.SURVIVED)
 
     @property
     def score_of_all(self) -> float | None:
-        """The share of killed mutants among all that change behaviour, including equivalent mutants."""
+        """Like `score`, but equivalent mutants count as not killed. None if no mutant changes behaviour."""
         return self._killed_of(*CHANGING_STATUSES)
 
     def _killed_of(self, *statuses: MutantStatus) -> float | None:
@@ -85,18 +85,19 @@ class MutationScore:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences that explain why the score may be unreliable."""
+        """One sentence for each reason why the score may be unreliable, such as too few mutants."""
         changing, equivalent = self.count(*CHANGING_STATUSES), self.count(MutantStatus.EQUIVALENT)
         found = []
         if changing < MIN_RELIABLE_MUTANTS:
-            found.append(f"{self.task}: only {changing} mutants change behaviour")
+            few = f"only {changing} mutants change behaviour, but a reliable score needs"
+            found.append(f"{self.task}: {few} {MIN_RELIABLE_MUTANTS}; add correct programs")
         if equivalent > MAX_EQUIVALENT_SHARE * changing:
-            share = f"more than {MAX_EQUIVALENT_SHARE:.0%}"
+            share = f"more than {MAX_EQUIVALENT_SHARE:.0%}, so the score is unreliable"
             found.append(f"{self.task}: {equivalent} of {changing} mutants are equivalent, {share}")
         return tuple(found)
 
     def data(self) -> dict[str, Any]:
-        """Return the task's entry in scores.json."""
+        """Return the task's entry in scores.json: its score, its counts, and the originals judged wrong."""
         return {
             "task": self.task,
             "worlds": self.worlds,

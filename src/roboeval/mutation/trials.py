@@ -34,10 +34,11 @@ def mutation_score(
     seed: int = 1,
     progress: ProgressBar = lambda items, *_: iter(items),
 ) -> MutationScore:
-    """Compute the mutation score of a task from mutants of its solutions and of further programs.
+    """Compute the mutation score of a task from mutants of its right solutions and of further programs.
 
     A program is right if it satisfies at least one prompt. A mutant is killed if it fails any prompt that its
-    original satisfies. Raises UserError if `worlds` is given but the suite does not sample its worlds.
+    original satisfies. Up to `most` mutants run in `worlds` sampled worlds (by default 200), or in the worlds
+    of a suite that samples none. Raise UserError if `worlds` is given but the suite samples none.
     """
     scenarios = mutation_worlds(suite, task, worlds, seed)
 
@@ -85,7 +86,7 @@ def _satisfied(scenarios: Sequence[Scenario], faults: Sequence[MutantResult | No
 
 
 def mutation_worlds(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
-    """Return the worlds in which mutants run. Sampled worlds get another seed than those of the suite."""
+    """Return the worlds for mutants: hand-written ones, or `count` (default: 200) sampled with a new seed."""
     if suite.worlds is None and count is None:
         return task.scenarios
     sampled = suite.with_worlds(count or DEFAULT_MUTANT_WORLDS, seed + 1 + (suite.seed or 0))
@@ -93,7 +94,7 @@ def mutation_worlds(suite: Suite, task: Task, count: int | None, seed: int) -> t
 
 
 def find_failure(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> MutantResult | None:
-    """Return the first failure of a program, or None if it satisfies every scenario."""
+    """Return the first failure among a program's outcomes, one per scenario, or None if it never fails."""
     verdicts = map(judge, outcomes, scenarios)
     return next((_killed(verdict) for verdict in verdicts if not verdict.satisfied), None)
 
@@ -101,9 +102,10 @@ def find_failure(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> 
 def judge_mutant(
     outcomes: Iterable[Outcome], before: Sequence[Outcome], scenarios: Sequence[Scenario]
 ) -> MutantResult:
-    """Judge a mutant, reading its outcomes only until a check fails. `before` are those of its original.
+    """Return a mutant's status, given its outcomes in the scenarios and those of its original (`before`).
 
-    A mutant that crashes in every world does not count as killed, because no check is needed to reject it.
+    Outcomes are read only until a check fails. A mutant that crashes in every world does not count as killed,
+    because no check is needed to reject it.
     """
     crashes: list[Verdict] = []
     changed = False

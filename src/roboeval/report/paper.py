@@ -17,7 +17,7 @@ PAPER_SUITE = "paper"
 
 @cache
 def published() -> dict[str, Any]:
-    """Read the published results of the paper."""
+    """Read the published results of the paper: pass@1 by task and prompt, and the causes of failures."""
     data: dict[str, Any] = json.loads(Path(__file__).with_name("published.json").read_text())
     return data
 
@@ -33,7 +33,7 @@ def model_of(run: JudgedRun) -> str | None:
 
 
 def recognised_models(runs: Iterable[JudgedRun]) -> list[str]:
-    """Say in a sentence which runs are by models of the paper. Return nothing if none is."""
+    """Return a sentence that lists the runs by models of the paper, or an empty list if there are none."""
     pairs = [f"{run.name} is {model}" for run in runs if (model := model_of(run)) is not None]
     return [f"Recognised by name as models of the paper: {', '.join(pairs)}."] if pairs else []
 
@@ -45,7 +45,7 @@ def uses_authors_prompts(run: JudgedRun) -> bool:
 
 
 def cell(model: str, task: str, prompt: int) -> float | None:
-    """Return the pass@1 that the paper gives for a model on one of the authors' prompts, or None."""
+    """Return a model's published pass@1 on one of the authors' prompts (from 0), or None if there is none."""
     rows = published()["pass_at_1"].get(task, [])
     return rows[prompt][_column(model)] if prompt < len(rows) else None
 
@@ -63,7 +63,7 @@ def overall_mean(model: str, tasks: Sequence[str]) -> float | None:
 
 
 def causes(model: str) -> Causes:
-    """Return the published causes of a model's failures."""
+    """Return the published causes of a model's failures, given the paper's name for the model."""
     at, classes, kinds = _column(model), published()["classes"], published()["kinds"]
     return Causes(
         {name: shares[at] / 100 for name, shares in classes.items()},

@@ -26,7 +26,7 @@ MAX_DRAWN_RUNS = 8  # readers cannot tell apart more colours
 
 @dataclass(frozen=True, eq=False)
 class JudgedRun:
-    """A run with its verdicts, and with its verdicts by other requirements, if there are any."""
+    """A run with its verdicts in a suite and, if there are any, its verdicts under other requirements."""
 
     results: Results
     table: pl.DataFrame  # the column `accepted` is null for unchecked programs
@@ -68,7 +68,7 @@ class JudgedRun:
 
     @cached_property
     def ablated_scores(self) -> tuple[TaskScore, ...]:
-        """The scores of all tasks when judged by common-sense requirements only."""
+        """The scores of all tasks by common-sense requirements only. Empty if these were not judged."""
         return () if self.ablated is None else task_scores(self.ablated.table, self.suite.tasks)
 
     @cached_property
@@ -89,13 +89,13 @@ class JudgedRun:
 
     @cached_property
     def instructions(self) -> Mapping[tuple[str, int], str]:
-        """The recorded instruction of each prompt, by task and prompt."""
+        """The instructions that were recorded, by task name and prompt number."""
         completions = self.results.completions.items()
         return {key[:2]: one.instruction for key, one in completions if one.instruction is not None}
 
     @cached_property
     def checked(self) -> tuple[CheckedPrompt, ...]:
-        """How many completions of each prompt pass the check, the task or both. Empty if any is unchecked."""
+        """The counts of each prompt's completions by check and verdict. Empty if any program is unchecked."""
         return () if self.table["accepted"].null_count() else count_by_prompt(self.table)
 
 
@@ -113,7 +113,7 @@ def runs_to_draw(runs: Sequence[JudgedRun]) -> tuple[list[JudgedRun], list[str]]
 
 
 def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
-    """Say for captions how much of each run was judged, or say it once if this is the same for all runs."""
+    """Return sentences on how much of each run was judged, or one sentence if this is equal for all runs."""
     sentences: dict[str, list[str]] = {}
     for run in runs:
         sentences.setdefault(run.coverage_sentence, []).append(run.name)
@@ -124,7 +124,7 @@ def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
-    """Parse labels of the form `RUN=TEXT`, and return them by the index of the run with that folder."""
+    """Parse labels such as `my-run=Mine`. Return each by the index of its run's folder in `paths`."""
     labels: dict[int, str] = {}
     names = [{str(path), path.resolve().name} for path in paths]
     for text in texts:
@@ -133,7 +133,7 @@ def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
             raise UserError(f'"{text}" is not a label; write --label RUN=TEXT')
         found = [at for at, known in enumerate(names) if run.rstrip("/") in known]
         if len(found) != 1:
-            which = "more than one run has that name" if found else "no such run is in the report"
+            which = "more than one run has this name" if found else "the report has no such run"
             raise UserError(f'--label is for "{run}", but {which}; use one of {", ".join(map(str, paths))}')
         labels[found[0]] = label.strip()
     return labels
@@ -145,7 +145,7 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
     for text in texts:
         model, _, numbers = text.rpartition("=")
         if not model:
-            raise UserError(f'"{text}" names no model; write MODEL=INPUT/OUTPUT, per million tokens')
+            raise UserError(f'"{text}" names no model; write MODEL=INPUT/OUTPUT, prices per million tokens')
         prices[model] = Price.read(numbers)
     return prices
 
@@ -168,15 +168,13 @@ def _extend_duplicates(names: Sequence[str], longer: Sequence[str]) -> list[str]
 
 
 def price_runs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> list[JudgedRun]:
-    """Give each run the price that `prices` has for its folder, name or model.
-
-    Raises UserError if a price is for none of the runs.
-    """
+    """Give each run the price for its folder, name or model. Raise UserError if a price fits no run."""
     names = [(run.folder, run.name, run.model or "") for run in runs]
     for model in prices:
         if not any(model in those for those in names):
             raise UserError(
-                f'--price is given for "{model}", but the runs are {", ".join(run.name for run in runs)}'
+                f'--price names "{model}", but no run has this name, model or folder; '
+                f"use one of {', '.join(run.name for run in runs)}"
             )
     found = (next((prices[name] for name in those if name in prices), None) for those in names)
     return [replace(run, price=price) for run, price in zip(runs, found, strict=True)]

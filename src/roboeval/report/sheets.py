@@ -31,7 +31,7 @@ def page_words() -> dict[str, dict[str, Any]]:
 
 
 def page_text(kind: str, name: str) -> Any:  # noqa: ANN401 - a string, or a mapping for tables
-    """Return the text of a section, figure, table or note from page.yaml."""
+    """Return an entry of page.yaml, such as `overall` of the kind `figures`. For tables, it is a mapping."""
     return page_words()[kind][name]
 
 
@@ -59,7 +59,7 @@ class Sheet(NamedTuple):
 def sheet(
     name: str, rows: Sequence[Sequence[Any]], *, notes: Sequence[str] = (), shares: Sequence[str] = ()
 ) -> Sheet:
-    """Create a table with the columns in page.yaml. `shares` are the heads of more columns, one per model."""
+    """Create a table with the columns in page.yaml, followed by a column of shares for each of `shares`."""
     kinds = page_text("tables", name)["columns"]
     columns = [Column(head, kind) for part in kinds for kind, heads in part.items() for head in heads]
     return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)
@@ -125,7 +125,7 @@ def _is_empty(part: Part) -> bool:
 
 
 def write_csv(table: Sheet, folder: Path) -> None:
-    """Write a table as a CSV file with full precision."""
+    """Write a table with full precision to a CSV file in a folder, named after the table."""
     types = {"text": pl.String, "class": pl.String, "count": pl.Int64}
     kinds = [types.get(column.kind, pl.Float64) for column in table.columns]
     schema = dict(zip(_heads(table.columns), kinds, strict=True))

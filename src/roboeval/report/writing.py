@@ -59,7 +59,7 @@ def sections(
     with_published: bool = False,
     command: str = "",
 ) -> list[Section]:
-    """Build all sections of a report on runs judged with the same suite."""
+    """Return the non-empty sections of a report on runs of one suite. `command` is its command line."""
     found = [
         glance(runs),
         scores.results(runs),
@@ -122,7 +122,7 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
-    """Describe the suite, its rules, and how to reproduce the report."""
+    """Describe the suite and its simulation settings, and introduce the command that makes the report."""
     head = runs[0].results.manifest
     version, digest = head.get("version"), head.get("digest")
     return (
@@ -136,7 +136,7 @@ def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
 
 
 def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], out: Path) -> Iterator[str]:
-    """Write a report to a folder, and yield the name of each part. The page comes last."""
+    """Write a report to the folder `out`. Yield the name of each part after writing it, the page last."""
     parts = [part for section in sections for part in section.parts]
     (out / "tables").mkdir(parents=True, exist_ok=True)
     if not (out / PAGE_FILE).exists():

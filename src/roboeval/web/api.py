@@ -34,7 +34,7 @@ EvaluationQuery: TypeAlias = Annotated[
 
 
 def router(store: RunStore, all_runs: RunList) -> APIRouter:
-    """Create the routes below `/api/runs`."""
+    """Create the routes below `/api/runs`, which return runs and completions as JSON, and reports."""
     api = APIRouter(
         prefix="/api/runs",
         tags=["runs"],
@@ -61,9 +61,9 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
 
     @api.get("/{run}/tables/{table}.csv")
     def show_table(run: str, table: str) -> Response:
-        """Show a table of a run's report as CSV."""
+        """Return a table of a run's report as CSV."""
         if not TABLE_NAME.fullmatch(table):
-            raise HTTPException(404, "this run has no such table")
+            raise HTTPException(404, "this run has no table with this name")
         return Response(store.report(run, f"tables/{table}.csv"), media_type="text/csv")
 
     @api.get("/{run}/completions")

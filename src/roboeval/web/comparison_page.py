@@ -38,7 +38,7 @@ DIFFERENT_SUITES = (
 
 
 async def draw_comparison(store: RunStore, names: Sequence[str]) -> None:
-    """Draw the runs with the given names side by side."""
+    """Draw up to 12 runs with the given names side by side."""
     PlainText("h1", "Runs side by side")
     if not names:
         PlainText("p", "Select runs in the list, then click \u201cShow side by side\u201d.", "quiet")
@@ -138,7 +138,7 @@ def _draw_run(run: Snapshot) -> None:
 
 @dataclass(frozen=True)
 class Difference:
-    """Which of two judged runs is better, in a sentence and, for a single pair, by task."""
+    """A comparison of two judged runs: a sentence and, if only two runs are compared, results by task."""
 
     runs: tuple[Snapshot, Snapshot]
     sentence: str  # states which run is better, and how significant the difference is
@@ -146,7 +146,7 @@ class Difference:
 
 
 def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
-    """Compare pairs of judged runs, and a single pair also by task. For large runs, this may take seconds."""
+    """Compare judged runs in pairs. Two runs are also compared by task. This may take several seconds."""
     pairs = pairs_to_compare(runs, lambda run: 0.0 if run.pass_at_1 is None else run.pass_at_1.mean)
     return [_difference(*pair, by_task=len(runs) == RUNS_IN_PAIR) for pair in pairs]
 
@@ -165,7 +165,7 @@ def _difference(first: Snapshot, second: Snapshot, *, by_task: bool) -> Differen
 
 
 def draw_differences(found: Sequence[Difference]) -> None:
-    """Draw the comparison of each pair of runs, and of a single pair also by task."""
+    """Draw a sentence for each pair of runs or, if there is only one pair, its comparison by task."""
     if len(found) == 1:
         _draw_difference(found[0])
         return

@@ -31,12 +31,12 @@ def shade(share: float | None, *, bad: bool) -> str:
 
 
 def run_address(run: str) -> str:
-    """Return the address of a run's page."""
+    """Return the path in the URL of a run's page, such as `/runs/my-run`."""
     return f"/runs/{quote(run, safe='', errors='replace')}"
 
 
 def models_of(run: Snapshot) -> str:
-    """Format the names of a run's models. If there are many, shorten the list."""
+    """Return the names of a run's models, separated by commas and shortened if the list is long."""
     if not run.models:
         return "model not recorded"
     return shortened(", ".join(run.models), MAX_MODELS_TEXT) + recorded_suffix(run.models)
@@ -75,7 +75,7 @@ class TaskCells:
 
     @property
     def columns(self) -> list[dict[str, Any]]:
-        """Return a column for the mean and a column for each prompt."""
+        """The columns of the run: one for the mean of a task, and one for each prompt."""
         numbers = [{"name": f"prompt {n}", "title": f"prompt {n} of each task"} for n in range(self._prompts)]
         return [{"name": "mean", "title": "mean over the prompts"}, *numbers]
 

@@ -25,7 +25,7 @@ from roboeval.web.widgets import page_of
 
 
 def pages(suites: Sequence[Suite] = ()) -> Pages:
-    """Create the pages of the benchmark. Runs may be judged by `suites` as well as by built-in suites."""
+    """Return the pages of the benchmark. Runs may be judged by `suites` as well as by installed suites."""
 
     def add(site: Site) -> None:
         store = RunStore(site.runs, suites)

@@ -21,13 +21,13 @@ from roboeval.web.snapshot import Snapshot
 MAX_SNAPSHOTS = 16  # number of evaluations kept in memory
 REPORT_PAGE, MAX_REPORT_BYTES = "index.html", 20_000_000  # file name and maximum size of a report
 REST_FACTOR = 10  # pause between two reads of a run, as a multiple of the time that a read takes
-OUTSIDE_FOLDER = "leads outside the folder of runs; move it into the folder"
+OUTSIDE_FOLDER = "is a link that leads outside the folder of runs; replace the link by its target"
 
 FileStamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
 
 
 class MissingError(UserError):
-    """Raised if a run, or a part of it, does not exist or was removed."""
+    """Raised if a run, or a part of a run, does not exist or was removed."""
 
 
 class RunStore:
@@ -43,24 +43,24 @@ class RunStore:
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """Read a run, or reuse its snapshot. `key` is an evaluation, by default one that is no ablation."""
+        """Return a run's latest snapshot. `key` names an evaluation, by default one of all requirements."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
-        """Return a value that changes when a file of the run changes. The run is not read."""
+        """Return a value that changes when a file of the run changes, without reading the run."""
         return self._reader(name, None).version()
 
     def report(self, name: str, part: str = REPORT_PAGE) -> bytes:
-        """Read the page or another part of a run's report. Raise UserError if it is absent or too large."""
+        """Read a file of a run's report, such as its page. Raise UserError if it is absent or too large."""
         path = self._reader(name, None).folder / "report" / part
         try:
             if _stamp(path, self.folder.resolve()) is not None:
                 if (size := path.stat().st_size) > MAX_REPORT_BYTES:
-                    raise UserError(f"is too large to show ({size:,} bytes); open the file", file=path.name)
+                    raise UserError(f"is too large to show ({size:,} bytes); open it on disk", file=path.name)
                 return path.read_bytes()
         except OSError:
             pass
-        raise MissingError("this run has no such report or table")
+        raise MissingError(f'the run "{shortened(name)}" has no file "report/{part}"; write a new report')
 
     def has_report(self, name: str) -> bool:
         """Whether a run has a report that is small enough to show."""
@@ -172,7 +172,7 @@ def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
     if not found.is_relative_to(within):
         raise UserError(OUTSIDE_FOLDER, file=path.name)
     if not stat.S_ISREG(status.st_mode):
-        raise UserError("is not a regular file", file=path.name)
+        raise UserError("is not a regular file; replace or remove it", file=path.name)
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 

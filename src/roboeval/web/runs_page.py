@@ -26,7 +26,7 @@ EXAMPLE_COMMAND = "run --model recorded:hasty --num-completions 3"
 
 
 async def draw_runs(folder: Path, runs: RunList) -> None:
-    """Draw a table of the runs in a folder."""
+    """Draw a table of the runs in a folder, which is refreshed every second."""
     PlainText("h1", "Runs")
     PlainText("p", f"In {shortened(str(await asyncio.to_thread(folder.resolve)), 200)}", "quiet")
     table = _Table(runs)

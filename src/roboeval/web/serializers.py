@@ -22,7 +22,7 @@ MAX_SUITE_NAME, MAX_FAILURE_REASON = 120, 300
 
 
 class RunState(StrEnum):
-    """The progress of a run."""
+    """The state of a run, as the pages and the API name it."""
 
     READING = "being read"
     GENERATING = "being generated"
@@ -35,7 +35,7 @@ class RunState(StrEnum):
 
 
 def state_of(run: Snapshot) -> RunState:
-    """Find out how far a run is: for example, `unfinished` if a completion is missing or not judged."""
+    """Return how far a run is: for example, `unfinished` if a completion is missing or not judged."""
     written, coverage = len(run.results.completions), run.results.coverage
     lacks = coverage.there < coverage.total
     unjudged = run.judged < run.results.scope.total
@@ -95,7 +95,7 @@ def date_of(about: Mapping[str, Any]) -> str | None:
 
 
 def notes(run: Snapshot) -> list[str]:
-    """Describe the problems of a run, one sentence each."""
+    """Return sentences on what to know about a run, such as that replies were cut off."""
     results = run.results
     found = []
     if (missions := results.scope.missions_sentence) is not None:
@@ -121,7 +121,7 @@ class RunList:
         self._known: dict[str, tuple[Hashable, dict[str, Any]]] = {}
 
     def data(self, seconds: float = math.inf) -> list[dict[str, Any]]:
-        """Summarise all runs, or say why one cannot be read. After `seconds`, use only known data."""
+        """Return a summary of each run, or why it cannot be read. After `seconds`, read no more runs."""
         until = time.monotonic() + seconds
         return [self._run_data(name, may_read=time.monotonic() < until) for name in self._store.names()]
 
@@ -142,7 +142,7 @@ class RunList:
 
 
 def run_details(run: Snapshot) -> dict[str, Any]:
-    """Return `run_data` with pass@1 of each task and prompt, and the number of failures of each kind."""
+    """Return `run_data` and, in addition, pass@1 of each task and prompt and the failures of each kind."""
     means = {score.task: score.pass_at(1).mean for score in run.scores}
     tasks: dict[str, list[dict[str, Any]]] = {}
     for prompt in run.prompts(CompletionFilter(passed=True)):
@@ -188,7 +188,8 @@ def completion_details(run: Snapshot, name: str) -> dict[str, Any]:
     try:
         data = completion_data(judged, results.completions[key], run.suite, ablated=results.is_ablated)
     except (UserError, KeyError, TypeError, IndexError, AttributeError, ValueError):
-        what = f"the row of {shortened(name_of(key), MAX_SUITE_NAME)} is damaged; --redo judges it again"
+        which = f"the row of {shortened(name_of(key), MAX_SUITE_NAME)} is damaged"
+        what = f"{which}; `roboeval evaluate --redo` judges the run again"
         raise UserError(what, file=results.run.rows(results.key or "").name) from None
     if run.suite is None:
         for world in data["worlds"]:

@@ -69,7 +69,7 @@ class CompletionFilter:
         return replace(self, task=None, prompt=None)
 
     def query(self, evaluation: str | None) -> str:
-        """Return the end of a URL for this filter, such as `?task=CountMen&passed=false`; empty for all."""
+        """Return the query of a URL, such as `?task=CountMen&passed=false`. It is empty without a filter."""
         values = {"evaluation": evaluation, **asdict(self)}
         if self.passed is not None:
             values["passed"] = str(self.passed).lower()
@@ -132,7 +132,7 @@ class Snapshot:
         return found.row(0, named=True) if found.height else None
 
     def select(self, chosen: CompletionFilter) -> pl.DataFrame:
-        """Select the completions that pass a filter, in order."""
+        """Return the rows of `completions` that a filter selects, in the same order."""
         return self.completions.filter(chosen.condition)
 
     def neighbours(
@@ -144,9 +144,9 @@ class Snapshot:
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
     def prompts(self, chosen: CompletionFilter) -> list[dict[str, Any]]:
-        """Count the completions of each prompt: `written`, `judged`, and `counted` (matching the filter).
+        """Count the `written` and `judged` completions of each prompt, and those that match (`counted`).
 
-        `share` is the share of judged completions that match, or None if none was judged.
+        The filter's own task and prompt are ignored. `share` is counted / judged, or None if none is judged.
         """
         judged = pl.col("judged")
         counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
@@ -180,7 +180,7 @@ class Snapshot:
     def failures(self) -> dict[tuple[str, str | None], Failures]:
         """The classes of failures that occur, each followed by its kinds, most frequent first.
 
-        A key is a class and a kind, or None for the whole class.
+        A key is a class and a kind of failure. The kind is None for the whole class.
         """
         found: dict[tuple[str, str | None], Failures] = {}
         for cause in failures(tally_of(self.results.table)) if self.judged else ():

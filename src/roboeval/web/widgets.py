@@ -29,7 +29,7 @@ MAX_PAGE_TITLE = 80
 
 @contextmanager
 def page_of(frame: Frame, title: str) -> Iterator[None]:
-    """Draw a page of the benchmark. The page shows each UserError as a sentence."""
+    """Draw the frame of a page, for the `with` block to fill. The page shows a UserError as a sentence."""
     frame(shortened(title, MAX_PAGE_TITLE), "/runs")
     ui.add_head_html(STYLESHEET_LINK.format(prefix=outside("")))
     with ui.element("div").classes("benchmark"):
@@ -51,7 +51,7 @@ class _DataElement(Element):
 
 
 class HeatMap(_DataElement, component="static/heat.js"):
-    """A table of shaded shares. A click on a cell follows its link, or calls `chosen` with task and prompt.
+    """A table of shaded shares. A click on a cell calls `chosen` with task and prompt, or opens its link.
 
     Its properties are `groups` with `name`, `href` and `columns` (`name`, `title`, `href`), and `rows` with
     `name` and `cells` (`text`, `shade`, `title`, `href`, `at`).
@@ -88,7 +88,7 @@ class ProgramView(Element, component="static/code.js"):
 
 
 def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = None) -> None:
-    """Show the progress of a run on a label and, if given, on a bar."""
+    """Show a run's state on a label and, if there is a bar, its progress. `data` is the run's `run_data`."""
     state = str(data["state"])
     label.say(state)
     label.classes(replace=f"state state-{state.replace(' ', '-')}")
@@ -100,7 +100,7 @@ def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = 
 
 
 def count_text(data: Mapping[str, Any]) -> str:
-    """Format how many completions there are, such as `12 of 80 judged`."""
+    """Format how many completions of a run are judged (or else written), such as `12 of 80 judged`."""
     if "completions" not in data:
         return MISSING
     coverage = Coverage(data["judged"], data["to_judge"], data["requested"])
@@ -122,5 +122,5 @@ def date_text(data: Mapping[str, Any]) -> str:
 
 
 def score_text(mean: Estimate | None) -> str:
-    """Format pass@1 of a run. Return an empty string if nothing was judged."""
+    """Format pass@1 of a run and its interval. Return an empty string if nothing was judged."""
     return "" if mean is None else f"pass@1 {mean.mean:.3f} ({mean.interval})"

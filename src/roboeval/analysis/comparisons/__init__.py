@@ -1,1 +1,1 @@
-"""Compares models, ways to act, and suites."""
+"""Compares models, programs with agents, and suites."""

@@ -69,7 +69,7 @@ def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
     """Compare two models on their common prompts. Raise UserError if there are none."""
     keys = [key for key in first if key in second]
     if not keys:
-        raise UserError("the runs have no prompt in common, so they cannot be compared")
+        raise UserError("the runs have no prompt in common; compare runs with completions for the same tasks")
     by_task: dict[str, list[tuple[float, float]]] = defaultdict(list)
     for key in keys:
         by_task[key[0]].append((first[key], second[key]))
@@ -95,12 +95,12 @@ def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
 
 
 def has_missions(table: pl.DataFrame) -> bool:
-    """Whether the completions in a table are missions of an agent, each in one world."""
+    """Whether any completion in a table is an agent's mission, which takes place in a single world."""
     return table["ending"].null_count() < table.height
 
 
 def per_mission(table: pl.DataFrame) -> pl.DataFrame:
-    """Return a run's table in which each row, a completion in one world, counts as a whole completion."""
+    """Return a run's table changed so that each row (a completion in one world) counts as a completion."""
     kept = pl.col("failure_class").is_in([NO_PROGRAM_CLASS, AGENT_ERROR_CLASS])
     is_check = pl.col("failed_checks").is_not_null()
     is_robots = pl.col("status") == Status.ROBOT_ERROR.value
@@ -120,12 +120,12 @@ def per_mission(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def comparable_tables(*tables: pl.DataFrame) -> Sequence[pl.DataFrame]:
-    """Return the tables of runs to compare. If any run has missions of an agent, apply `per_mission`."""
+    """Return the tables changed by `per_mission` if any of them has an agent's missions, or unchanged."""
     return [*map(per_mission, tables)] if any(map(has_missions, tables)) else tables
 
 
 def compare_tables(first: pl.DataFrame, second: pl.DataFrame) -> Comparison:
-    """Compare two runs with `compare_scores`. If one has missions of an agent, count both by mission."""
+    """Compare the tables of two runs on common prompts. If one has missions, count both by `per_mission`."""
     found = compare_scores(*(pass_at_1(task_scores(table)) for table in comparable_tables(first, second)))
     if not (has_missions(first) or has_missions(second)):
         return found
@@ -144,7 +144,7 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
 def pairs_to_compare(
     runs: Sequence[RunLike], pass_at_1: Callable[[RunLike], float]
 ) -> list[tuple[RunLike, RunLike]]:
-    """Return all pairs of runs. If there are too many, pair each run only with the best one."""
+    """Return all pairs of runs. If there are more than 10, pair each run only with the best by pass@1."""
     pairs = list(combinations(runs, 2))
     if len(pairs) <= MAX_PAIRS:
         return pairs
@@ -153,12 +153,12 @@ def pairs_to_compare(
 
 
 def p_text(p: float) -> str:
-    """Format a p-value, such as "p = 0.042"."""
+    """Format a p-value, such as "p = 0.042" or "p < 0.001"."""
     return f"p = {p:.3f}" if p >= MIN_SHOWN_P else f"p < {MIN_SHOWN_P}"
 
 
 def comparison_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
-    """Describe which run is better, how significant this is, and how many prompts were left out."""
+    """Say which of the two named runs is better, with the p-value, and how many prompts were left out."""
     sentence = _better_sentence(comparison, names)
     if not comparison.left_out:
         return sentence
@@ -245,7 +245,7 @@ def _ends(estimate: Estimate) -> dict[str, float]:
 
 
 def sample_size_sentences(comparison: Comparison) -> list[str]:
-    """Describe how many completions or prompts are needed to detect the difference."""
+    """Say how many completions or prompts would detect the difference. Return nothing for missions."""
     sizes = comparison.sample_sizes
     if comparison.counts_missions:
         return []

@@ -30,7 +30,7 @@ class TaskChanges:
 
 @dataclass(frozen=True)
 class VerdictChanges:
-    """The effect of judging a run with a second suite."""
+    """How the verdicts on a run change if a second suite judges it."""
 
     name: str
     suites: tuple[str, str]
@@ -53,7 +53,7 @@ class VerdictChanges:
 
 
 def verdict_changes(name: str, first: Results, second: Results) -> VerdictChanges:
-    """Find the completions whose verdicts differ. Raise UserError if none was judged with both suites."""
+    """Compare a run's verdicts under two suites. Raise UserError if no completion was judged with both."""
     one, other = completions_of(first.table), completions_of(second.table)
     both = one.select(*KEY, "passed").join(other.select(*KEY, then="passed"), on=KEY).sort(KEY)
     if both.is_empty():
@@ -94,7 +94,7 @@ def _by_task(both: pl.DataFrame, order: Iterable[str]) -> Iterator[TaskChanges]:
 
 
 def ranks(found: Sequence[VerdictChanges]) -> tuple[dict[str, int], dict[str, int]]:
-    """Rank the runs under each suite, starting at 1. Runs with equal scores share a rank."""
+    """Return the rank of each run, from 1, under the first suite and under the second. Ties share a rank."""
     first, second = ({run.name: run.pass_at_1[side] for run in found} for side in (0, 1))
     return _ranked(first), _ranked(second)
 
@@ -131,7 +131,7 @@ def describe_run(found: VerdictChanges) -> str:
 
 
 def describe_ranking(found: Sequence[VerdictChanges]) -> list[str]:
-    """Describe changes in the ranking. Return nothing for a single run."""
+    """Say whether the ranking changes, and how. Return an empty list for a single run."""
     if len(found) < 2:  # noqa: PLR2004 - a ranking requires two runs
         return []
     first, second = found[0].suites
@@ -146,7 +146,7 @@ def _in_order(places: Mapping[str, int]) -> str:
 
 
 def warn_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
-    """Return a warning if the runs have different prompts."""
+    """Return a warning if the runs have different prompts, or else an empty list."""
     asked = {frozenset((task.task, task.prompts) for task in one.comparison.tasks) for one in found}
     return ["The runs have different prompts, which may affect their ranking."] if len(asked) > 1 else []
 

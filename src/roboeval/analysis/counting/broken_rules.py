@@ -26,11 +26,11 @@ class BrokenRules:
 
 
 def count_broken_rules(table: pl.DataFrame, without: pl.DataFrame | None = None) -> BrokenRules:
-    """Count the programs that break house rules.
+    """Count the programs that break house rules, and compute how much the rules change pass@1.
 
     Args:
         table: The results of an evaluation with house rules, from `load_results`.
-        without: The results of the same run, judged without house rules.
+        without: The results of the same run, judged without house rules, or None if there are none.
     """
     breaks = pl.col("error_kind").eq_missing(VIOLATION)
     marked = table.with_columns(passed=breaks.any().over(KEY))

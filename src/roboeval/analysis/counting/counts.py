@@ -17,7 +17,7 @@ Tally: TypeAlias = Counter[tuple[str, int, bool, str | None, str | None]]
 
 
 def outcome_of(row: Row) -> tuple[str, int, bool, str | None, str | None]:
-    """Return the key under which a `Tally` counts a judged completion."""
+    """Return a row's key in a `Tally`. Its failure class and kind are None if the completion passed."""
     why = row["failure"]
     failed = (None, None) if why is None else (why["class"], why["kind"])
     return row["task"], row["prompt"], why is None, *failed
@@ -29,7 +29,7 @@ def completions_of(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def tally_of(table: pl.DataFrame) -> Tally:
-    """Count the judged completions in a table."""
+    """Count the judged completions in a table by task, prompt and kind of failure."""
     columns = "task", "prompt", "passed", "failure_class", "failure_kind"
     counted = completions_of(table).group_by(columns, maintain_order=True).len()
     return Counter({tuple(outcome): count for *outcome, count in counted.iter_rows()})
@@ -53,5 +53,5 @@ def scores_of(tally: Tally, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
 
 
 def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-    """Compute the scores of tasks and prompts in a table, see `scores_of`."""
+    """Compute the scores of tasks and prompts in a table. Tasks not in `order` come last."""
     return scores_of(tally_of(table), order)

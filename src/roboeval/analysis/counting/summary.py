@@ -18,7 +18,7 @@ from roboeval.suites.load import Suite
 
 @dataclass(frozen=True)
 class Failures:
-    """Counts the failures of a class, or of a kind within a class."""
+    """The number and share of failures of a class, or of a kind within a class."""
 
     name: str
     count: int
@@ -50,7 +50,7 @@ class EvaluationSummary:
 
     @property
     def coverage(self) -> Coverage:
-        """The numbers of judged, existing and requested completions."""
+        """The numbers of judged, existing and requested completions of the selected tasks."""
         return self.scope.coverage(self.judged)
 
 
@@ -60,7 +60,7 @@ def summarise(
     """Summarise an evaluation. Raise UserError if nothing was judged or if k is too large for a prompt."""
     tasks = scores_of(tally, suite.tasks)
     if not tasks:
-        raise UserError(f"0 of {how_many(scope.total)} judged; there are no results yet")
+        raise UserError(f"0 of {how_many(scope.total)} judged; `roboeval evaluate` judges them")
     try:
         estimates = tuple(overall(tasks, tries) for tries in k)
     except ValueError as error:
@@ -104,7 +104,7 @@ class Causes:
 
 
 def causes(tally: Tally) -> Causes:
-    """Compute the shares of outcomes (paper, section V.B). At least one completion must be judged."""
+    """Compute the share of each outcome (paper, section V.B). At least one completion must be judged."""
     found, passed = failures(tally), sum(n for (_, _, has_passed, *_), n in tally.items() if has_passed)
     kinds = {one.name: sorted((k.name, k.count) for k in one.kinds if k.count) for one in found}
     return Causes(
@@ -116,7 +116,7 @@ def causes(tally: Tally) -> Causes:
 
 
 def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
-    """Return the kinds of failure of a class that occur in any of `found`, with known kinds first."""
+    """Return the kinds of failure of a class (`name`) that occur in any of `found`, known kinds first."""
     occurring = {kind for one in found for kind in one.kinds.get(name, {})}
     known = [kind for kind in FAILURE_CLASSES[name].kinds if kind in occurring]
     return [*known, *sorted(occurring - {*known})]

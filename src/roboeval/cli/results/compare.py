@@ -59,14 +59,14 @@ def compare(
     elif len(runs) == _PAIR:
         compare_runs(runs, suite, ablated=ablation, as_json=json)
     else:
-        fail(f"name two runs, not {len(runs)}; only --suites accepts another number")
+        fail(f"name two runs, not {len(runs)}; another number of runs is only possible with --suites")
 
 
 _PAIR = 2
 
 
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
-    """Print how much better the second of two runs is."""
+    """Print how much better the second of two runs is, as tables or as JSON."""
     from roboeval.analysis.comparisons.compare import (
         comparable_tables,
         compare_tables,
@@ -94,7 +94,7 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
 
 
 def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:
-    """Print which verdicts the second of two suites changes."""
+    """Print which verdicts the second of two suites changes. `suites` is such as `paper,plus`."""
     from roboeval.analysis.comparisons.verdict_changes import changes_data, verdict_changes
     from roboeval.cli.views.comparison import changes_view
     from roboeval.evaluation.runs.completions import how_many
@@ -142,7 +142,7 @@ def resample(
     with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
         results = open_current(run, suite, ablated=False, rules=rules)
         if has_missions(results.table):
-            fail(f"{run}: holds missions of an agent, which cannot be checked; name a run of programs")
+            fail(f"{run}: contains missions of an agent, which cannot be checked; name a run of programs")
         checker = engine_for(len(results.places))
         prompts = count_by_prompt(check_run(results, checker))
     coverage = results.coverage
@@ -155,7 +155,7 @@ def resample(
 
 
 def check_run(results: Results, engine: OpenEngine) -> pl.DataFrame:
-    """Check the programs of a run, save the results, and return the run's table with them in `accepted`."""
+    """Check the programs of a run and save the results. Return its table with the new column `accepted`."""
     from roboeval.evaluation.runs.table import with_answers
 
     completions = [results.completions[key] for key in results.places]
@@ -167,7 +167,7 @@ def check_run(results: Results, engine: OpenEngine) -> pl.DataFrame:
 def check_completions(
     run: RunFolder, suite: Suite, completions: Collection[Completion], engine: OpenEngine
 ) -> dict[tuple[str, str], list[str]]:
-    """Check programs, save the results in their run, and return the problems by task and program hash."""
+    """Check programs, save the results in the run, and return their problems by task and program hash."""
     from roboeval.evaluation.generating.checks import check_programs
 
     different = {(one.task, one.program_sha256) for one in completions}

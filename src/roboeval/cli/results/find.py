@@ -91,7 +91,7 @@ def parse_formula(text: str) -> Formula:
 def found_data(
     one: TraceMatch, worlds: Sequence[tuple[int, str]], passed: Container[CompletionKey]
 ) -> dict[str, Any]:
-    """Return a found completion and its matching worlds as JSON data."""
+    """Return a completion with the given worlds as JSON data, for `roboeval find --json`."""
     from roboeval.evaluation.runs.completions import name_of
 
     return {

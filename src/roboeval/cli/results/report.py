@@ -89,7 +89,7 @@ def report(
 def judged_run(
     results: Results, suite: str, *, beside: str | None, rules: Path | None, engine: OpenEngine | None
 ) -> JudgedRun:
-    """Return a run with further verdicts on it, if any: of its ablation, a second suite and house rules.
+    """Return a run for a report, with its verdicts from an ablation, the suite `beside` and house rules.
 
     The engine checks the programs. Without an engine, the report has no results of the check.
     """

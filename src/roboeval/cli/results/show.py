@@ -89,7 +89,7 @@ def show(
 
 
 def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
-    """Count broken house rules, and compare with the evaluation without rules if it exists."""
+    """Count broken house rules in a table, and compare pass@1 with the run's evaluation without rules."""
     from roboeval.analysis.counting.broken_rules import count_broken_rules
     from roboeval.evaluation.runs.folder import evaluation_key
     from roboeval.evaluation.runs.results import read_results
@@ -107,7 +107,7 @@ def print_summary(
     as_json: bool,
     house: BrokenRules | None = None,
 ) -> None:
-    """Print the tables of an evaluation."""
+    """Print the tables of an evaluation under a title, or print its data as JSON."""
     from roboeval.analysis.counting.summary import summary_data
     from roboeval.cli.views.results import house_view, summary_view
 
@@ -125,7 +125,7 @@ def print_summary(
 
 
 def show_run(results: Results, k: list[int], *, title: str, has_rules: bool, as_json: bool) -> None:
-    """Print the tables of a whole run."""
+    """Print the tables of a whole run with pass@1 and pass@k for each `k`, or print the data as JSON."""
     from roboeval.analysis.counting.counts import tally_of
     from roboeval.analysis.counting.summary import summarise
 
@@ -136,7 +136,7 @@ def show_run(results: Results, k: list[int], *, title: str, has_rules: bool, as_
 
 
 def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool) -> None:
-    """Print the results of a task or a prompt."""
+    """Print the results of a task or, if a prompt number is given, of one of its prompts."""
     from roboeval.analysis.counting.tasks import prompt_data, task_data
     from roboeval.cli.views.completions import prompt_view
     from roboeval.cli.views.results import task_view
@@ -151,7 +151,7 @@ def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool)
 def show_completion(
     judged: Results, key: CompletionKey, *, in_full: bool, with_reply: bool, as_json: bool
 ) -> None:
-    """Print a completion with the reasons of its verdict."""
+    """Print a completion with its program and the reasons for its verdict."""
     from roboeval.cli.views.completions import completion_view
     from roboeval.evaluation.judging.explanation import completion_data
 

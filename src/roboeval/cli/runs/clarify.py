@@ -75,7 +75,7 @@ COLUMNS = {"one": "one program", "majority": "majority", "question": "one questi
 
 
 def clarify_view(data: Mapping[str, Any], title: str, candidates: int) -> RenderableType:
-    """Show pass@1 of one program, of the largest cluster and with a question, for each prompt and overall."""
+    """Return a table of pass@1 of one program, of the largest cluster, and with a question, by prompt."""
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text

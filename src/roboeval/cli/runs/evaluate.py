@@ -82,7 +82,7 @@ def evaluate(
             judged_by = judged_by.with_worlds(worlds, seed)
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
         if left:
-            note(f"not judged because they have no ablation: {', '.join(left)}")
+            note(f"tasks that are not judged because they have no ablation: {', '.join(left)}")
         tally, failed, table = Tally(), None, None
         if rules is not None:
             from roboeval.evaluation.runs.table import TableBuilder  # imports polars, which loads slowly
@@ -95,7 +95,7 @@ def evaluate(
             about = {} if opened.run is None else about_of(opened.run)
             scope = JudgingScope.of(opened.completions, wanted, about, judged_by)
             if scope.total == 0:
-                fail(f"{source}: contains no completion for {tasks or 'a task with an ablation'}")
+                fail(f"{source}: contains no completion of {tasks or 'a task to judge'}; name another source")
             if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
                 run.keep(opened.completions)
             running = engine_for(scope.total)

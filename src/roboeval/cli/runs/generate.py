@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class GenerationRequest:
-    """A command's request: which completions to generate, from which model, and for which run."""
+    """What a command asks for: which completions to generate, with which model, and in which run folder."""
 
     name: str  # the name of the model
     settings: SamplingSettings
@@ -64,7 +64,7 @@ class GenerationRequest:
         return RunFolder(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
 
     def open(self) -> Model:
-        """Open the model, which may be a recorded one."""
+        """Open the model by its name. It may be a recorded model, which needs no network."""
         from codebotler.models.open import open_model
         from codebotler.models.recorded import is_recorded
         from roboeval.evaluation.runs.source import recorded_model_for
@@ -117,7 +117,7 @@ def read_options(
     base_url: BaseUrlOption = None,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> GenerationRequest:
-    """Convert the options that `generate` and `run` share to a request."""
+    """Read the options that `generate` and `run` share. Exit with status 2 if they do not fit together."""
     from codebotler.models.open import NOT_CALLING, choose_model, kind_of
     from roboeval.evaluation.agents.conversation import TurnLimits
     from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan
@@ -136,9 +136,9 @@ def read_options(
         contract, count = read_within(within, known.skills), num_completions or 1
         plan = AgentPlan(known, selected, count, mode=mode, limits=limits, contract=contract)
     elif max_turns or max_mission_tokens or within:
-        fail("--max-turns, --max-mission-tokens and --within need --mode agent or replan; add it")
+        fail("--max-turns, --max-mission-tokens and --within need --mode agent or --mode replan; add one")
     if mode == "replan" and kind_of(chosen.name) == "recorded":
-        fail(f"{chosen.name} writes no program for the rest of a mission; name a language model")
+        fail(f"{chosen.name} cannot continue a failed mission; for --mode replan, name a language model")
     if mode == "agent" and kind_of(chosen.name) in NOT_CALLING:
         fail(f"{chosen.name} cannot call tools; --mode agent needs a chat model, such as openai-chat:NAME")
     return GenerationRequest(chosen.name, settings, plan, pace, suite, out)
@@ -179,7 +179,7 @@ def generate(
     what = read_options(**options)
     if requests is not None:
         if what.plan.has_turns:
-            fail("--requests cannot write what follows from replies; leave it or --mode out")
+            fail("--requests does not work with --mode, whose requests depend on replies; leave one out")
         write_batch(what, requests)
         return
     model = what.open()
@@ -277,7 +277,7 @@ def further_rounds(
 ) -> Iterator[Path]:
     """Regenerate or repair rejected programs in up to `most` rounds, and yield the folder of each round.
 
-    There are no more rounds once the check accepts all programs.
+    The rounds end early if the check accepts all programs. Exit with status 1 if completions are missing.
     """
     from roboeval.evaluation.generating.requests import RoundPlan
 
@@ -307,13 +307,13 @@ def further_rounds(
 
 
 def expect_rounds_fit(plan: GenerationPlan, repair: int, retries: int, *, as_json: bool) -> None:
-    """Exit with status 2 if other options do not allow further rounds."""
+    """Exit with status 2 if --repair or --retries is combined with an option that does not allow it."""
     if repair and retries:
         fail("--repair and --retries cannot be combined; use one of them")
     if as_json and (repair or retries):
         fail("--json does not work with --repair or --retries; run `evaluate --json` on each round's folder")
     if plan.has_turns and (repair or retries):
-        fail("--repair and --retries are for programs; leave them or --mode out")
+        fail("--repair and --retries do not work with --mode; leave out --mode, or use neither of them")
 
 
 class GenerationMeter(ExitStack):

@@ -40,7 +40,7 @@ def mcp(
     from roboeval.evaluation.runs.folder import RunFolder, tasks_to_judge
 
     if sys.stdin.isatty():
-        fail("an MCP client starts this command and talks to it; see the guide for its configuration")
+        fail("this command only works if an MCP client starts it; the guide shows the client's configuration")
     known = load(suite)
     selected = tasks_to_judge(known, tasks, ablated=False)[0]
     limits = TurnLimits(max_turns or DEFAULT_TURNS["agent"])

@@ -1,4 +1,4 @@
-"""Defines the command recover, which measures how a model does the rest of missions that ended early."""
+"""Defines the command recover, which measures how a model continues missions that ended early."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def recover(
     json: JsonOption = False,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
-    """Let skill calls fail, and judge how a model does the rest.
+    """Let skill calls fail, and judge how a model continues.
 
     Each call of the first right program of each task fails once, in each world.
     """
@@ -55,7 +55,7 @@ def recover(
     known, chosen = load(suite), choose_model(model, base_url)
     completions = open_source(source, known).of(tasks_to_judge(known, tasks, ablated=False)[0])
     if any(one.acted is not None for one in completions):
-        fail(f"{source}: holds missions of an agent; name a run of programs")
+        fail(f"{source}: contains missions of an agent; name a run of programs")
     settings = chosen.add_server(model_settings(**sampling))
     is_own = is_recorded(chosen.name) and settings.base_url is None
     opened = recorded_model_for(chosen.name, known) if is_own else open_model(chosen.name, settings)
@@ -64,7 +64,7 @@ def recover(
         found = show_progress(find_first_right(worker, known, completions), "running", len(completions))
         faults = [one for each in found for one in each]
         if not faults:
-            fail(f"{source}: contains no right program")
+            fail(f"{source}: contains no program that passes its task; name a source that has one")
         ended = [one for one in faults if not isinstance(one, FaultResult)]
         prompts = [one.prompt(known) for one in ended]
         with progress_meter("asking", len({*prompts})) as update:
@@ -80,7 +80,7 @@ def recover(
 
 
 def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
-    """Show a table with a row for each task and one for all of them."""
+    """Return a table of the results with a row for each task and one for all of them."""
     from rich.console import Group
     from rich.text import Text
 

@@ -32,7 +32,7 @@ def comparison_view(
     runs: Sequence[Results],
     failing: Sequence[Mapping[str, float]],
 ) -> RenderableType:
-    """Show a comparison of two runs, given the shares of their completions that fail, by class."""
+    """Return a view of a comparison. `failing` holds each run's share of completions that fail, by class."""
     a, b = map(visible, names)
     rows = grid("left", "right", "left")
     what = "missions that succeed:" if comparison.counts_missions else "pass@1 of"
@@ -70,7 +70,7 @@ def comparison_view(
 
 
 def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
-    """Show which verdicts a second suite changes, with at most `most` groups per run and direction."""
+    """Return a view of the verdicts that a second suite changes. A list shows up to `most` groups."""
     parts: list[RenderableType] = [Text(visible(sentence), "bold") for sentence in sentences(found)]
     parts += [Text(), _scores(found)]
     for one in found:

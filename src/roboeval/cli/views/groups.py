@@ -32,7 +32,7 @@ def found_view(
     groups: int,
     is_search: bool,
 ) -> RenderableType:
-    """Show groups of failures. After a search, first list the completions found in each task."""
+    """Return a view of the groups `shown`. If `is_search`, it starts with what was found in each task."""
     failed = sum(one.key not in passed for one in found)
     parts: list[RenderableType] = []
     if is_search:
@@ -63,7 +63,7 @@ def _by_task(found: Sequence[TraceMatch], passed: Container[CompletionKey]) -> T
 
 
 def failure_group_view(group: FailureGroup) -> RenderableType:
-    """Show a group of failures: its size, the reason, and the nearest passing program."""
+    """Return a view of a group of failures: its size, the reason, and the most similar passing program."""
     size = how_many(len(group.members))
     name = visible(name_of(group.representative))
     head = Text.assemble((size, "bold"), f" of {visible(group.task)}, ", kind_view(group.failure))
@@ -85,7 +85,7 @@ def failure_group_view(group: FailureGroup) -> RenderableType:
 def resample_view(
     prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str, coverage: Coverage
 ) -> RenderableType:
-    """Show the results of rejection sampling for each limit of retries."""
+    """Return a view of the results of rejection sampling, with a row for each limit on retries."""
     reaching = (f"pass@1\n≥ {t:g}" for t in THRESHOLDS)
     table = ruled("retries", "pass@1", *reaching, "accepted", "run at all", first="right")
     for limit in (resample(prompts, retries) for retries in limits):

@@ -32,7 +32,7 @@ def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
 
 
 def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
-    """Show the tables of an evaluation."""
+    """Return a view of an evaluation: its scores by task, its pass rates and its failures."""
     head = Text(visible(title) + recorded_suffix(summary.scope.models), style="bold")
     if summary.ablated:
         head.append(" (ablation: only common sense was required)", style="not bold")
@@ -53,7 +53,7 @@ def summary_view(summary: EvaluationSummary, *, title: str) -> RenderableType:
 
 
 def house_view(found: BrokenRules) -> RenderableType:
-    """Show how often house rules were broken, and their effect on pass@1."""
+    """Return a view of how often house rules were broken, and of their effect on pass@1."""
     table = grid("right", "left")
     for rule, count in found.by_rule.items():
         table.add_row(f"{count:,}", Text(visible(rule)))
@@ -103,7 +103,7 @@ def _failure_table(failures: Failures) -> Table:
 
 
 def task_view(data: Mapping[str, Any]) -> RenderableType:
-    """Show the results of a task for each prompt, given its `task_data`."""
+    """Return a view of the results of each prompt of a task, given its `task_data`."""
     task = data["task"]
     models = {model for prompt in data["prompts"] for model in prompt["models"]}
     parts: list[RenderableType] = [Text(visible(task) + recorded_suffix(models), style="bold")]

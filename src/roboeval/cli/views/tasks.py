@@ -15,7 +15,7 @@ from roboeval.suites.task import describe_contents, world_title
 
 
 def suite_view(suite: Suite) -> RenderableType:
-    """Show all tasks, one per row."""
+    """Return a table of a suite's tasks for the terminal, one per row."""
     table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
     table.add_column("task", no_wrap=True)
     table.add_column("worlds", justify="right")
@@ -28,7 +28,7 @@ def suite_view(suite: Suite) -> RenderableType:
 
 
 def suite_task_view(task: Task) -> RenderableType:
-    """Show a task: its prompts, its checks, and the requirements of each world."""
+    """Return a view of a task: its prompts, its checks, and the requirements of each world."""
     parts: list[RenderableType] = [
         Text.assemble((task.name, "bold"), f"  {task.summary}"),
         Text(f"needs {', '.join(task.abilities)}", "dim"),

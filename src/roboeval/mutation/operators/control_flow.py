@@ -22,7 +22,7 @@ ENDS = ast.Break | ast.Continue | ast.Return
 
 
 def before_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Moves code that belongs after a loop before its last iteration."""
+    """Runs the code that follows a loop before the loop's last iteration."""
     for block in program.blocks:
         for at, loop in enumerate(block):
             after = block[at + 1 :]
@@ -53,7 +53,7 @@ def _negated(test: ast.expr) -> ast.expr:
 
 
 def negate_a_condition(program: ProgramTree, _: Context) -> Edits:
-    """Negates a condition."""
+    """Negates a condition, or one operand of `and` or `or` in a condition."""
     for test in _tests(program):
         yield {test: _negated(test)}
         if isinstance(test, ast.BoolOp):
@@ -138,7 +138,7 @@ def do_not_stop(program: ProgramTree, _: Context) -> Edits:
 
 
 def give_up(program: ProgramTree, _: Context) -> Edits:
-    """Stops waiting after one or three attempts."""
+    """Ends a `while` loop, such as one that waits, after one or three iterations."""
     for loop in program.loops:
         if isinstance(loop, ast.While):
             endless = isinstance(loop.test, ast.Constant) and loop.test.value

@@ -32,7 +32,7 @@ def pass_no_choice(program: ProgramTree, _: Context) -> Edits:
 
 
 def forget_an_argument(program: ProgramTree, _: Context) -> Edits:
-    """Removes the last argument of a call."""
+    """Removes the last argument from the call of a skill."""
     for node, _skill in _own_calls(program):
         if node.args:
             yield {node: ast.Call(node.func, node.args[:-1], node.keywords)}
@@ -48,12 +48,12 @@ def handle_no_error(program: ProgramTree, _: Context) -> Edits:
 
 
 def skip_a_step(program: ProgramTree, _: Context) -> Edits:
-    """Removes a step that later steps may depend on."""
+    """Removes the call of a skill, on which later steps may depend."""
     return ({node: []} for node in program.nodes if isinstance(node, ast.Expr) and _is_own(node.value))
 
 
 def take_a_step_again(program: ProgramTree, _: Context) -> Edits:
-    """Repeats a step."""
+    """Calls a skill twice instead of once."""
     for node in program.nodes:
         if isinstance(node, ast.Expr) and _is_own(node.value):
             yield {node: [node, node]}
@@ -73,7 +73,7 @@ def _own_calls(program: ProgramTree) -> Iterator[tuple[ast.Call, Skill]]:
     for node in program.nodes:
         if isinstance(node, ast.Call) and _is_own(node):
             skill = by_name(skill_of(node) or "")
-            assert skill is not None, "it calls a skill"
+            assert skill is not None, "the called function must be a skill"
             yield node, skill
 
 

@@ -40,7 +40,7 @@ def skip_the_first(program: ProgramTree, _: Context) -> Edits:
 
 
 def skip_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Skips the last item of a sequence."""
+    """Skips the last item of a sequence, such as the last room."""
     return ({items: expression("list(items)[:-1]", items=items)} for items in _sequences(program))
 
 
@@ -63,13 +63,13 @@ def drop_the_return(program: ProgramTree, _: Context) -> Edits:
 
 
 def drop_a_drive(program: ProgramTree, _: Context) -> Edits:
-    """Removes a drive."""
+    """Removes a drive, but not the drive back to the starting point."""
     returns = _return_places(program)
     return ({step: []} for step, call in program.steps("go_to") if call not in returns)
 
 
 def wrong_room(program: ProgramTree, context: Context) -> Edits:
-    """Replaces a room with another one."""
+    """Replaces the name of a room with the name of another room."""
     for node in program.nodes:
         room = (text_of(node) or "").lower().removeprefix("the ")
         if room in {one.lower() for one in context.rooms}:
@@ -117,7 +117,7 @@ def detour(program: ProgramTree, context: Context) -> Edits:
 
 
 def plural_rooms(program: ProgramTree, _: Context) -> Edits:
-    """Searches room names for the plural of a word."""
+    """Searches room names for the plural of a word, such as `labs` instead of `lab`."""
     for node in program.nodes:
         match node:
             case ast.Compare(ast.Constant(str(word)) as left, [ast.In() | ast.NotIn()], [_]):

@@ -171,7 +171,7 @@ def _in_place_of(reported: ast.AST, value: str | float) -> ast.expr:
 
 @only_if(TELLING)
 def forget_to_say(program: ProgramTree, _: Context) -> Edits:
-    """Removes a message."""
+    """Removes a message that the robot says."""
     return ({step: []} for step, _call in program.steps("say"))
 
 

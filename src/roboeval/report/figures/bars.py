@@ -69,7 +69,7 @@ def _whisker(cap: float) -> dict[str, Any]:
 
 
 def draw_task_scores(runs: Sequence[JudgedRun]) -> Figure:
-    """Draw pass@1 by task and model, with intervals over prompts. A second panel judges common sense only."""
+    """Draw pass@1 by task and run, with intervals. A second panel shows common-sense results, if any."""
     tasks = tasks_of(runs)
     judged = {score.task for run in runs for score in run.ablated_scores}
     ablated = [task for task in runs[0].suite.tasks if task in judged]
@@ -154,7 +154,7 @@ def _two_lines(task: str) -> str:
 def draw_heat_map(
     axes: Axes, cells: Sequence[Sequence[float]], rows: Sequence[str], columns: Sequence[str]
 ) -> None:
-    """Draw shares as a heat map with numbers."""
+    """Draw shares from 0 to 1 as a heat map with percentages. `rows` and `columns` are its labels."""
     axes.pcolormesh(np.array(cells), cmap=shades(), vmin=0, vmax=1, edgecolors=BACKGROUND, linewidth=0.6)
     axes.invert_yaxis()
     middles = [at + 0.5 for at in range(max(len(rows), len(columns)))]
@@ -171,7 +171,7 @@ def draw_heat_map(
 
 
 def draw_causes(found: Sequence[tuple[str, Causes]]) -> Figure:
-    """Draw how often each class of outcome occurs in each run, and the kinds of failure in each class."""
+    """Draw how often each outcome occurs in each named run, and the kinds of failure in each class."""
     happened = {name for _, one in found for name, share in one.classes.items() if share}
     shown = classes_to_show(happened)
     kinds = {name: kinds_in_order([one for _, one in found], name) for name in shown}

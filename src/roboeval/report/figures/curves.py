@@ -32,7 +32,7 @@ Points: TypeAlias = Sequence[tuple[float, float]]
 
 
 def draw_thresholds(runs: Sequence[JudgedRun]) -> Figure:
-    """Draw the share of prompts that reach each threshold of pass@1, with one line per model."""
+    """Draw the share of prompts that reach each threshold of pass@1, with one line per run."""
     most = most_completions(runs)
     lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()]), most) for run in runs}
     figure = _plot_lines(lines, 2.75, drawstyle="steps-post", markevery=[0, -1])
@@ -47,7 +47,7 @@ def most_completions(runs: Sequence[JudgedRun]) -> int:
 
 
 def draw_accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
-    """Draw the share of accepted programs by number of retries, with one line per model."""
+    """Draw the share of accepted programs after 0, 1, 2, ... retries, with one line per run."""
     lines = {name: [*enumerate(those)] for name, those in shares.items()}
     figure = _plot_lines(lines, 2.6, markevery=[*LIMITS])
     axes = figure.axes[0]
@@ -98,7 +98,7 @@ def _threshold_labels(axes: Axes) -> None:
 
 
 def draw_limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
-    """Draw the share of prompts that reach each pass@1: a panel per model, a line per limit on retries."""
+    """Draw the share of prompts that reach each pass@1, down to 1 / `most`, by run and limit on retries."""
     columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3)
     rows = math.ceil(len(curves) / columns)
     figure = new_figure(PAGE_WIDTH if columns > 1 else COLUMN_WIDTH, 1.75 * rows + 0.55)

@@ -55,7 +55,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def render(figure: Figure) -> dict[str, bytes]:
-    """Render a figure as png, pdf and svg without dates and versions. The layout is computed only once."""
+    """Return the content of a figure's files by ending (`png`, `pdf`, `svg`), without dates or versions."""
     if (layout := figure.get_layout_engine()) is not None:
         layout.execute(figure)
         figure.set_layout_engine(None)
@@ -74,13 +74,13 @@ def shades() -> LinearSegmentedColormap:
 
 
 def short_name(name: str, most: int = MAX_FIGURE_NAME) -> str:
-    """Shorten a name for a figure. Omit the middle, because names differ most at their ends."""
+    """Shorten a name to `most` characters by omitting its middle, because names differ most at the ends."""
     name, end = visible(name), (most - 1) // 2
     return name if len(name) <= most else f"{name[: most - 1 - end]}…{name[-end:]}"
 
 
 def share_axis(axes: Axes, *, along: str = "y") -> None:
-    """Scale the y-axis, or the axis `along`, from 0 to 100%."""
+    """Scale an axis for shares, from 0 to 100%. `along` is `x` or `y`."""
     axis = axes.yaxis if along == "y" else axes.xaxis
     (axes.set_ylim if along == "y" else axes.set_xlim)(0, 1)
     axis.set_ticks([0, 0.25, 0.5, 0.75, 1], ["0", "25", "50", "75", "100%"])

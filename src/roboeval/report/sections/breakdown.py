@@ -45,7 +45,7 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table that compares tasks in which the robot must come back and report with all others."""
+    """Build the table of pass rates and failures of tasks where the robot must report back, and of others."""
     reporting = {one.name for one in runs[0].suite.tasks.values() if REPORT_ABILITY in one.abilities}
     rows: list[list[Cell]] = []
     for run in runs:
@@ -66,10 +66,7 @@ def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def never_returned(row: Row) -> bool:
-    """Whether the robot left its starting room for good in the world where the completion failed.
-
-    Returns False if the trace was too long to be stored.
-    """
+    """Whether the robot left its starting room for good in the failing world. False if this is unknown."""
     verdict = row["verdicts"][failure_of(row)["world"]]
     if "cut" in verdict:
         return False
@@ -101,7 +98,7 @@ def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def distinct_words(one: str | None, other: str | None) -> tuple[str, str]:
-    """Return the words that occur only in the first text, and the words that occur only in the second."""
+    """Return the words only in the first text, and those only in the second, or a note if one is None."""
     if one is None or other is None:
         return NO_INSTRUCTION, NO_INSTRUCTION
     words = (re.findall(r"[^\W_]+(?:['\u2019][^\W_]+)*", text.lower()) for text in (one, other))

@@ -26,7 +26,7 @@ MAX_GROUPS_SHOWN = 200  # number of groups on the page
 
 
 def causes_section(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
-    """Build the section on causes of failures (paper, section V.B)."""
+    """Build the section on causes of failures, optionally with those published (paper, section V.B)."""
     drawn, left_out = runs_to_draw(runs)
     shown = all_causes(drawn, with_published=with_published)
     figure = ReportFigure("causes", lambda: figures.draw_causes(shown), [*coverage_of(runs), *left_out])
@@ -54,7 +54,7 @@ def most_frequent(run: JudgedRun) -> str:
 
 
 def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
-    """Build the table of all causes with their counts and shares."""
+    """Build the table of all causes with their counts and shares, given the causes of each named run."""
     rows = [
         [name, cause, kind, one.counts.get((cause, kind)), share]
         for name, one in found
@@ -109,7 +109,7 @@ def _cells(one: FailureGroup) -> list[Cell]:
 
 
 def other_suite(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section that compares the verdicts under this suite with those under another suite."""
+    """Build the section that compares verdicts under the report's suite with those under another suite."""
     found = [
         verdict_changes(run.name, run.results, run.other_suite) for run in runs if run.other_suite is not None
     ]
@@ -142,7 +142,7 @@ def house(runs: Sequence[JudgedRun]) -> Section:
             continue
         found = count_broken_rules(run.house.table, run.results.table)
         broken, cost = found.broken, found.cost
-        assert cost is not None, "it was also judged without rules"
+        assert cost is not None, "the run was also judged without rules"
         scores = overall(run.scores, 1).mean, overall(task_scores(run.house.table), 1).mean
         rows.append([run.name, broken.mean, broken.low, broken.high, *scores, cost.mean, cost.low, cost.high])
         by_rule += [[rule, run.name, count] for rule, count in found.by_rule.items()]

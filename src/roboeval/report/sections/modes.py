@@ -16,7 +16,7 @@ from roboeval.report.sheets import Cell, Sheet, sheet
 
 
 def mode_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of the success rate and costs of each run's missions. It is empty without agents."""
+    """Build the table of success and cost per mission of each run. It is empty if no run has an agent."""
     rows: list[list[Cell]] = []
     for run in runs if any(has_missions(run.table) for run in runs) else ():
         completions, missions = run.completions, per_mission(_table(run))
@@ -46,7 +46,7 @@ def _mean(values: pl.Series) -> float | None:
 
 
 def ending_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of the ways in which missions of agents ended, and after how many replies."""
+    """Build the table of how agents' missions ended, how many of them passed, and after how many replies."""
     turns = pl.col("turns")
     columns = (
         pl.len(),

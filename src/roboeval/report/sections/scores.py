@@ -93,7 +93,7 @@ def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def differences(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section that compares pairs of runs."""
+    """Build the section that compares runs in pairs. If there are many, it compares each with the best."""
     rows: list[list[Cell]] = []
     sentences: list[str] = []
     notes: list[str] = []
@@ -119,7 +119,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
 
 
 def leader(runs: Sequence[JudgedRun]) -> list[str]:
-    """Compare the two best runs in a sentence. Return nothing for a single run."""
+    """Return a sentence that compares the two best runs, or an empty list if they cannot be compared."""
     if len(runs) == 1:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)
