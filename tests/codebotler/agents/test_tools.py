@@ -660,7 +660,9 @@ def test_steps_and_reported_events_and_waiting_calls_are_limited(
 def test_invalid_calls_do_not_reach_the_robot(gatekeeper: Gatekeeper) -> None:
     async def act(agent: Agent) -> None:
         assert 'no skill "fly"' in await agent.fails("begin_steps", purpose="fly", contract={"fly": {}})
-        assert 'no "text"' in await agent.fails("begin_steps", purpose="a", contract={"say": {"text": "any"}})
+        assert 'no key "text"' in await agent.fails(
+            "begin_steps", purpose="a", contract={"say": {"text": "any"}}
+        )
         key, _ = await begin_steps(agent, gatekeeper, "go_to", "ask")
         for wrong in ({}, {"location": 3}, {"location": ["kitchen"]}, {"location": "kitchen", "more": 1}):
             assert "go_to" in await agent.fails("call_skill", steps=key, name="go_to", arguments=wrong)

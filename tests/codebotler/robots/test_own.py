@@ -229,7 +229,7 @@ def test_robot_does_not_connect_while_a_stop_is_under_way(write: Write) -> None:
         robot.disconnect()
         with pytest.raises(NotReadyError):
             robot.connect()
-        robot._body.gate.set()  # type: ignore[attr-defined]
+        robot._body.gate.set()  # type: ignore[attr-defined]  # of a class in a file
         stop.result(SOON)
         with pytest.raises(CancelledError):
             speech.result(SOON)
