@@ -93,7 +93,7 @@ async def read_last_past(ctx: AgentContext) -> MissionPast:
 def ask_whether(
     past: Annotated[MissionPast, Resolve(read_last_past)], ctx: AgentContext
 ) -> Elicit[StepWord] | NotAsked:
-    """Have the client ask its person whether the unsure step happened, or return NotAsked."""
+    """Have the client ask its person whether a step happened if the log does not say so."""
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NotAsked()

@@ -204,7 +204,7 @@ class MissionSession(SharedView):
             self._stop_button.press(by)
 
     def stop_soon(self, by: str) -> threading.Thread:
-        """Stop on a new thread, for signal handlers and event loops, and return the thread."""
+        """Call `stop` on a new thread, since signal handlers must not wait, and return the thread."""
         stopping = threading.Thread(target=self.stop, args=(by,), daemon=True)
         stopping.start()
         return stopping

@@ -171,7 +171,7 @@ def prompt_for(
 
 
 def stub(skill: Skill) -> str:
-    """Return a skill's signature and docstring for prompts, with errors and, if custom, an example call."""
+    """Return a skill as prompts show it: signature, docstring, errors and, if custom, an example call."""
     lines = [skill.doc.replace('"""', "'''")]
     if skill.fails:
         lines.append(f"Fails with an exception if {listed([when for _, when in skill.fails], 'or if')}.")

@@ -151,7 +151,7 @@ class OwnRobot:
         raise CancelledError
 
     def cancel(self) -> None:
-        """Call the object's `stop` unless a call of it is under way, and cancel an async method that runs."""
+        """Call the object's `stop`, unless it is being called already, and cancel a running async method."""
         with self._stop_lock:
             is_calling = not self._stop_returned.is_set()  # on another thread
             self._stopped = True

@@ -135,7 +135,7 @@ def positions_in_scopes(scopes: tuple[formulas.Scope, ...], trace: Trace) -> ran
 
 
 def bounding_event(scope: formulas.Scope, trace: Trace, span: range) -> int | None:
-    """Return the position of the event that bounds a scope within a span, or None if no event matches."""
+    """Return the position in `span` of the event at which a scope begins or ends, or None."""
     found = occurrences(scope.element, trace, span)
     return next(found, None) if scope.name.endswith("First") else max(found, default=None)
 

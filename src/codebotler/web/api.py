@@ -137,7 +137,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/continue", status_code=201)
     async def continue_mission(mission: str, form: ContinueForm) -> dict[str, Any]:
-        """Begin a new mission for the rest of another. If that one has no instruction, edit the program."""
+        """Begin a mission for the rest of another one. Without an instruction, replace its program then."""
         summary, _ = await asyncio.to_thread(_read_mission, console, mission)
         past = await asyncio.to_thread(console.past_of, summary.id)
         if form.happened is not None:

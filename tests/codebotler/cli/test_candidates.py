@@ -138,7 +138,7 @@ def test_run_runs_the_chosen_program(tmp_path: Path) -> None:
     words = "run", STAPLER, "--model", "recorded:hasty", "--world", "world.yaml", "--speed", "1000"
     ended = codebotler(*words, "--candidates", "3", "--yes", cwd=tmp_path)
     assert ended.status == 0
-    assert "3 of 3 programs" in ended.err
+    assert "all of 3 programs" in ended.err
     assert "stapler" in ended.out
 
 

@@ -365,7 +365,7 @@ def test_home_that_cannot_be_created_is_refused(folder: Path) -> None:
     process = start(folder, *words, wrapper=["env", "CODEBOTLER_HOME=/sys/home"])
     _, err = process.communicate("", timeout=60)
     assert process.returncode == 2
-    assert re.fullmatch(r"codebotler: /sys/home/\w+: .*CODEBOTLER_HOME\n", err)
+    assert re.fullmatch(r"codebotler: /sys/home/\w+: .*CODEBOTLER_HOME to another\n", err)
 
 
 @pytest.mark.slow

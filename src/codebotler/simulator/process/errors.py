@@ -23,7 +23,7 @@ class ProtocolError(Exception):
 
 
 def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, RunError]:
-    """Return a run's status and error, from its process's exit status or signal and processor time limit."""
+    """Explain why a process died, from its exit status and its limit of processor time in `seconds`."""
     match -status:
         case signal.SIGXCPU:
             return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")

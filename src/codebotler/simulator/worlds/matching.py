@@ -73,7 +73,7 @@ _WORD = re.compile(r"[\w'\u2019-]+")
 
 
 def meant_by(request: str, labels: Iterable[str], *, plain: bool = False) -> list[str]:
-    """Return the label that equals a request, or else each label that matches the most of its whole words.
+    """Return the label that equals a request, or else the labels that match most of the request's words.
 
     `labels` are regexes, as in world files, or plain names if `plain` is true.
     """

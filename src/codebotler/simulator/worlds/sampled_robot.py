@@ -280,7 +280,7 @@ class SampledRobot(SimulatedRobot):
         return [] if means_anybody(entity) or meant_by(entity, known, plain=True) else fitting
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return the things `where` (anywhere if empty) that fit `is_` (all if empty); presence is random."""
+        """Return things in a room, or anywhere, that fit `is_` if given. Which are there is random."""
         return self._all_of(self.room_map.things, where, is_ or "thing", is_person=False)
 
     def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:

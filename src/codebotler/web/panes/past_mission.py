@@ -72,7 +72,7 @@ class _MissionPage:
         self._source = DrawnBox("source", _draw_source, "pre").props("tabindex=0 dir=auto")
 
     def show(self, summary: MissionSummary, events: Sequence[LogLine], rest: MissionSummary | None) -> None:
-        """Show a mission, including new events, and a link to the mission that did its rest."""
+        """Show a mission with its events, and a link to the mission that continued it, if any."""
         self.has_ended = summary.has_ended
         self._head.show((summary, state_words(summary, self._console.view), rest))
         self._source.show(summary)

@@ -189,7 +189,7 @@ def generate(
 
 
 def write_batch(what: GenerationRequest, path: Path) -> None:
-    """Write the requests of a run to a file, and print how to continue."""
+    """Write the requests of a run to a file for a batch endpoint, and print the next command."""
     with installed():
         from codebotler.models.servers.batch import BatchModel
     from roboeval.evaluation.generating.batches import write_requests

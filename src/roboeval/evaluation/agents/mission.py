@@ -142,7 +142,7 @@ class AgentMission:
 
     @property
     def outcome(self) -> Outcome:
-        """The outcome of the calls so far, by which the mission is judged like a program."""
+        """The outcome of the calls so far, as if a program had made them; it decides the verdict."""
         kind = "robot-error" if self.ending == ERROR else "finished"
         end = {"end": kind, "number": len(self._ledger.errors) - 1}
         outcome = judge_end(self._ledger.outcome_at_end(end), self.robot)

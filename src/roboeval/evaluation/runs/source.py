@@ -49,7 +49,7 @@ MAX_ANSWER_BYTES = 10 * MAX_ROW  # an answer may contain more than we keep
 
 
 def is_answers(path: Path) -> bool:
-    """Return whether a file starts like requests to a batch endpoint, or like answers from one."""
+    """Return whether a file begins with a request to a batch endpoint, or with an answer from one."""
     if not path.is_file():
         return False
     _, line = next(read_lines(path, limit=MAX_ANSWER_BYTES), (0, b""))
