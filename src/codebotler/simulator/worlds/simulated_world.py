@@ -101,7 +101,7 @@ class SimulatedWorld:
         return next((room.within for room in self.world.rooms if room.name == goal), "") or goal
 
     def possible_rooms(self, request: str) -> Sequence[str]:
-        """Return all rooms that a request may mean. The exact name of one room may also fit another's label."""
+        """Return all rooms that a request may mean. A room's exact name may also fit other labels."""
         if self.settings.matching == "longest-name":
             around = {room.name: room.within for room in self.world.rooms if room.within}
             return goals_meant(request, self.goals, around)
