@@ -140,17 +140,23 @@ class Encounter(NamedTuple):
 
 
 def _encounters(trace: Trace) -> Iterator[Encounter]:
-    """Yield all encounters of a run with people, and with things that it has not moved before."""
-    moved: set[str] = set()
+    """Yield the encounters of a run with people, and with things in rooms where it has put none of them.
+
+    After it has picked up a mug in a room, the next one there is `mug 2`.
+    """
+    taken, put = Counter[tuple[str, str]](), set[tuple[str, str]]()
     for one in trace:
         name = normalized(one.to or SOMEBODY if one.kind == ASK else one.text)
         is_person = one.kind == ASK or means_person(one.text)
         is_known = one.kind in {CHECK, PICK} or (one.kind == ASK and bool(one.answer))
-        if is_known and name not in moved and not one.failed:
+        at = name, one.place
+        if is_known and at not in put and not one.failed:
             said = (_plain(one.text), _plain(one.answer or "")) if one.kind == ASK else ()
-            yield Encounter(name, one.place, one.found is not False, is_person, said)
-        if one.kind in {PICK, PLACE}:
-            moved.add(name)
+            which = f"{name} {taken[at] + 1}" if taken[at] else name
+            yield Encounter(which, one.place, one.found is not False, is_person, said)
+        taken[at] += one.kind == PICK
+        if one.kind == PLACE:
+            put.add(at)
 
 
 def rooms_with_several(traces: Iterable[Trace]) -> frozenset[str]:

@@ -173,7 +173,7 @@ def _share(shown: CandidateCluster, size: int, total: int) -> str:
     """Say how many candidates act like a cluster, in all worlds and in this one, and whether it waits."""
     worlds = counted(len(shown.samples), "imagined world")
     here = f"; {counted(size - shown.size, 'other')} would do the same here, but not in other worlds"
-    waits = f"; waits or searches without success in {shown.in_vain} of {worlds}"
+    waits = f"; waits or ends without success in {shown.in_vain} of {worlds}"
     share = f"{shown.size} of {counted(total, 'program')}"
     return f"{share}{here * (size > shown.size)}{waits * bool(shown.in_vain)}"
 
@@ -271,7 +271,8 @@ def _words(key: Aspect, sample: Sample, rooms: Container[str], limits: WordLimit
         )
     if kind == "room":
         rooms = [one.destination for one in outcome.trace if one.kind == GOTO and one.destination is not None]
-        return f"ends in {rooms[-1]}" if rooms else "stays where it is"
+        ends = "ends" if outcome.error is None else "is then"
+        return f"{ends} in {rooms[-1]}" if rooms else "stays where it is"
     if kind == "ending":
         return "finishes" if outcome.error is None else f"does not finish: {brief(outcome.error.message)}"
     return _events((one for one in outcome.trace if one.kind not in PAPER_KINDS), "does nothing else")

@@ -204,6 +204,7 @@ class Mission:
     def continue_from(self, past: MissionPast) -> None:
         """Record, before this mission runs, that it continues an earlier one, and log the earlier steps."""
         self.summary.continues = past.mission
+        self.summary.write(self.folder)  # this process may be killed before the first program is checked
         self._write("past", **past.data())
         if past.testimony:
             self.note(past.testimony)

@@ -367,10 +367,14 @@ class MissionSession(SharedView):
         option = question.chosen(answer)
         if option is not None:
             who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
-            rather = "".join(f"; not: {one.difference}" for one in question.options if one is not option)
-            mission.note(f"{who}{question.supposition}: a robot that {option.difference}{rather}")
+            mission.note(f"{who}{question.supposition}: a robot that {option.difference}")
+            for one in (one for one in question.options if one is not option):
+                mission.note(f"another option was a robot that {one.difference}")
             self._take(mission, option.program)
-        elif not more or question.why_last:
+            return
+        for sentence in question.rejections:
+            mission.note(sentence)
+        if not more or question.why_last:
             mission.fail(f"no program does what was meant{question.why_last and '; '}{question.why_last}")
         else:
             self._rejected = question

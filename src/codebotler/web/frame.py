@@ -98,8 +98,8 @@ class PlainText(TextElement):
 
 
 def scroll_up() -> None:
-    """Scroll to the first pane on small screens, where the panes form one column."""
-    ui.run_javascript("matchMedia('(max-width: 1180px)').matches && scrollTo(0, 0)")
+    """Scroll to the top of the page, where the next step is."""
+    ui.run_javascript("scrollTo(0, 0)")
 
 
 def scroll_to(element: str) -> None:

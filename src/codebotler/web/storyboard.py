@@ -164,7 +164,8 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
     error = sample.outcome.error
     is_harmless = sample.in_vain and sample.number not in check.evidence
     if is_harmless:
-        ending = "The robot waits or searches without success; this does not count as a problem."
+        why = "waits" if error is None or error.kind == "TimeoutError" else shortened(error.message)
+        ending = f"Ends without success ({why}), which does not count as a problem in this world."
     elif error is not None:
         ending = f"Fails: {shortened(error.message, _MAX_STEP_TEXT)} ({shortened(error.kind)})"
     else:

@@ -7,6 +7,7 @@ from codebotler.candidates.behaviour import (
     Behaviour,
     behaviour_of,
     claims_of,
+    count_conflicts,
     names_in,
     rooms_with_several,
     statements,
@@ -158,3 +159,12 @@ def test_addressee_counts_where_candidates_name_different_people() -> None:
     ]
     assert len({*shown}) == 3
     assert observe(alice) == observe(bob)
+
+
+def test_a_room_does_not_have_two_things_for_one_run_and_one_for_another() -> None:
+    pick, look = Event("pick", "mug", place="hall"), Event("check", "mug", found=False, place="hall")
+    put = Event("place", "mug", place="hall")
+    assert count_conflicts([(pick, pick), (pick, look)]) == 1
+    assert count_conflicts([(pick,), (pick, look)]) == 0
+    assert count_conflicts([(pick, pick), (pick, put, look)]) == 0, "the robot has put it there"
+    assert count_conflicts([(pick,), (look,)]) == 1

@@ -122,6 +122,7 @@ def test_a_continuation_that_never_ran_leaves_the_past_unchanged(tmp_path: Path)
     past = read_past(fail(tmp_path, BRING), SKILLS)
     with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
         mission.continue_from(past)
+        assert MissionSummary.read(mission.folder).continues == past.mission, "also if the tool is killed now"
         mission.fail("the model is away")
     again = read_past(mission.folder, SKILLS)
     assert again.mission == past.mission, "the mission that ran is continued"

@@ -97,7 +97,7 @@ def _vain_searches(found: CheckResult) -> Iterator[Text]:
     count = sum(sample.in_vain for sample in found.samples)
     if 0 < count < len(found.samples):
         where = f"in {count} of {len(found.samples)} worlds"
-        yield Text(f"{where}, the robot waits or searches without success; this is not a problem", "dim")
+        yield Text(f"{where}, the robot waits or ends without success; this is not a problem", "dim")
 
 
 def _distinct_samples(found: CheckResult) -> list[Sample]:

@@ -107,7 +107,7 @@ class MissionPast:
         """A clause that names the unsure step, for a question to a person; empty if there is no such step."""
         if self.unsure is None:
             return ""
-        return f"the log does not say whether the robot {self._unsure_words}"
+        return f"the robot began this, but the log does not say whether it happened: {self._unsure_words}"
 
     @property
     def _unsure_words(self) -> str:

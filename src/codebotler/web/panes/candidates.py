@@ -23,6 +23,7 @@ class CandidatesPane:
 
     def __init__(self, console: Console) -> None:
         self._console = console
+        self._more: ui.input | None = None  # what should be different, if there is a second question
         self._box = DrawnBox("which", self._draw)
 
     def show(self, view: SessionView) -> None:
@@ -39,13 +40,14 @@ class CandidatesPane:
                 with ui.element("article").classes("card"):
                     self._draw_option(option, number)
         PlainText("p", question.left_out, "quiet")
-        more = None
+        self._more = None
         if question.why_last:
             PlainText("p", f'{capitalize(question.why_last)}, so "None of these" ends the mission.', "quiet")
         else:
-            more = ui.input("What should be different?").props(f"outlined maxlength={_MAX_SENTENCE}")
+            label = "If none of these: what should be different?"
+            self._more = ui.input(label).props(f"outlined maxlength={_MAX_SENTENCE}")
         with ui.element("div").classes("others"):
-            Button("None of these", lambda: self._reject(more), "plain")
+            Button("None of these", self._reject, "plain")
             Button("You decide (the first one)", lambda: self._answer("decide"), "plain")
 
     def _draw_option(self, option: CandidateOption, number: int) -> None:
@@ -60,16 +62,20 @@ class CandidatesPane:
         button = Button("This one", lambda: self._answer(number), "go")
         button.props(f'aria-label="This one: option {number + 1}"')
 
-    async def _reject(self, more: ui.input | None) -> None:
+    async def _reject(self) -> None:
         """Answer `none`, with a sentence if there is a field for one."""
-        sentence = "" if more is None else str(more.value or "").strip()
-        if more is not None and not sentence:
+        if self._more is not None and not self._words:
             warn("Say what should be different, or stop the mission.")
         else:
-            await self._answer("none", sentence)
+            await self._answer("none")
 
-    async def _answer(self, answer: ClarifyingAnswer, more: str = "") -> None:
-        session = self._console.session
+    @property
+    def _words(self) -> str:
+        return "" if self._more is None else str(self._more.value or "").strip()
+
+    async def _answer(self, answer: ClarifyingAnswer) -> None:
+        """Answer with the words that were typed, which count only for `none`, and are refused otherwise."""
+        session, more = self._console.session, self._words
         if session is not None:
             scroll_up()  # before the answer, which removes the question from the page
             await asyncio.to_thread(session.answer, self._box.content, answer, more)

@@ -39,6 +39,7 @@ def recover(
 
     Each call of the first right program of each task fails once, in each world.
     """
+    from codebotler.core.text.words import counted
     from codebotler.models.open import choose_model, open_model
     from codebotler.models.recorded import is_recorded
     from codebotler.simulator.worker import Worker
@@ -76,7 +77,8 @@ def recover(
         data = {"source": source, "model": opened.name, **recovery_data(results)}
         print_json({**data, "missions": list(map(asdict, results))})
     else:
-        print_rich(recovery_view(results, f"{source}, continued by {opened.name}"))
+        rests = f"rests for {sum(map(bool, programs))} of {counted(len(ended), 'mission')}"
+        print_rich(recovery_view(results, f"{source}, continued by {opened.name}: {rests}"))
 
 
 def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
