@@ -41,15 +41,15 @@ class Cart:
 
     def stop(self) -> None:
         """Stop at once; the current drive then ends with an error."""
-        post("stop")
+        post("stop", timeout=5)
 
 
-def post(path: str, **values: str):  # type: ignore[no-untyped-def]  # any JSON # noqa: ANN201 - the same
+def post(path: str, *, timeout: float = 600, **values: str):  # type: ignore[no-untyped-def]  # any JSON # noqa: ANN201 - the same
     """Send a request, and return its answer; raise a RobotError if the cart refuses."""
     body = json.dumps(values).encode()
     request = Request(f"{URL}/{path}", body, {"Content-Type": "application/json"})  # noqa: S310 - the robot's own
     try:
-        with urlopen(request, timeout=600) as answer:  # noqa: S310 - the same
+        with urlopen(request, timeout=timeout) as answer:  # noqa: S310 - the same
             return json.load(answer)
     except HTTPError as error:
         if error.code == 409:  # noqa: PLR2004 - conflict: it cannot do that

@@ -270,7 +270,8 @@ class Mission:
             outcome = self._run_program(live) if drive is None else drive(live)
         except BaseException as error:  # noqa: BLE001 - any error must stop the robot
             try:
-                live.stop()
+                if not isinstance(error, StoppedError):  # then the robot has been told already
+                    live.stop()
             finally:
                 self._end(
                     live, MissionState.FAILED, _reason(error), None, is_lost=isinstance(error, RobotLostError)

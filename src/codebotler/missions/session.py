@@ -200,7 +200,8 @@ class MissionSession(SharedView):
 
     def stop(self, by: str) -> None:
         """Stop the robot, then all other work. Return once the request has reached the robot."""
-        if self.may_move or not self._view.is_over:
+        has_ended = self._view.is_over or (self._mission is not None and self._mission.has_ended)
+        if self.may_move or not has_ended:
             self._stop_button.press(by)
 
     def stop_soon(self, by: str) -> threading.Thread:
@@ -239,8 +240,9 @@ class MissionSession(SharedView):
             self._show(is_over=True, busy="", is_written=False)
 
     def _lead_mission(self) -> None:
-        with Reservation(self._robot, self._home) as reserved:
-            self._stop_button.attach(self._robot)
+        attach = partial(self._stop_button.attach, self._robot)
+        with Reservation(self._robot, self._home, attach) as reserved:
+            attach()  # again, since a press may have come before the robot was connected
             name, instruction = self._robot.name, self._order.instruction
             if (past := self._order.past) is not None:
                 # Another mission may have done the rest since this past was read.

@@ -151,24 +151,30 @@ class OwnRobot:
         raise CancelledError
 
     def cancel(self) -> None:
-        """Call the object's `stop`, unless it is being called already, and cancel a running async method."""
+        """Cancel a running async method, and call the object's `stop` unless it is being called already."""
         with self._stop_lock:
-            is_calling = not self._stop_returned.is_set()  # on another thread
             self._stopped = True
-            self._stop_returned.clear()
+            if self._stop_returned.is_set():
+                self._stop_returned.clear()
+                threading.Thread(target=self._call_stop, daemon=True).start()
         self.clock.stop()
-        if is_calling:
-            self._stop_returned.wait(STOP_SECONDS)
-            return
+        self._cancel_running()
+        if not self._stop_returned.wait(STOP_SECONDS):
+            self.failed_stop = f"{self.name}.stop failed: it took too long; {STOP_BY_HAND}"
+        self._cancel_running()  # it may have begun just before
+
+    def _call_stop(self) -> None:
         try:
             self._finish(self._body.stop(), STOP_SECONDS)
         except Exception as error:  # noqa: BLE001 - cancel must not raise
-            why = f"no return in {STOP_SECONDS:g} s" if isinstance(error, TimeoutError) else _describe(error)
+            why = "it took too long" if isinstance(error, TimeoutError) else _describe(error)
             self.failed_stop = f"{self.name}.stop failed: {why}; {STOP_BY_HAND}"
         else:
             self.failed_stop = ""
         finally:
             self._stop_returned.set()
+
+    def _cancel_running(self) -> None:
         if (running := self._running) is not None:
             running.cancel()
 

@@ -7,6 +7,7 @@ import os
 import socket
 import stat
 import threading
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from datetime import datetime
 from hashlib import sha256
@@ -31,14 +32,15 @@ class Reservation:
     Args:
         robot: the robot, not yet connected.
         home: the folder that contains the missions.
+        on_lock: a function to call once the robot is locked, before it is connected.
 
     Raises:
         NotReadyError: another process uses the robot, connecting fails, or other users can change the locks.
         OSError: the lock file cannot be written.
     """
 
-    def __init__(self, robot: Robot, home: Path) -> None:
-        self.robot, self._home = robot, home
+    def __init__(self, robot: Robot, home: Path, on_lock: Callable[[], object] = bool) -> None:
+        self.robot, self._home, self._on_lock = robot, home, on_lock
         self._lock = -1
         self._is_used = threading.Lock()
 
@@ -48,6 +50,7 @@ class Reservation:
             stack.callback(os.close, self._lock)
             self._take()
             stack.callback(self.robot.disconnect)
+            self._on_lock()
             self.robot.connect()
             self._at_end = stack.pop_all()
         return self
@@ -59,6 +62,15 @@ class Reservation:
         """Claim this connection for a mission, or raise NotReadyError if a mission has already used it."""
         if not self._is_used.acquire(blocking=False):
             raise NotReadyError(f"the robot {self.robot.name} has already run a mission; connect it again")
+
+    def holder(self) -> str:
+        """Return who has locked the robot, such as `process 417, since 10:02:11`, or "" if nobody has."""
+        with suppress(OSError, NotReadyError), self._path().open("rb") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return file.read(1_000).decode(errors="replace")
+        return ""
 
     def _path(self) -> Path:
         if self.robot.address:

@@ -218,7 +218,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
     ) -> dict[str, Any]:
         """Stop the current mission. Return whether there was one, and a warning if a robot was lost."""
         stopping = console.stop(BY_PAGE, only_moving=only_moving, holds=True)
-        return {"stopping": stopping, "warning": console.warning}
+        return {"stopping": stopping, "warning": console.warning or console.used_elsewhere}
 
     @api.get("/missions/{mission}/events", response_class=StreamingResponse)
     async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:

@@ -18,6 +18,7 @@ from codebotler.checking.problems import CheckResult
 from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
 from codebotler.core.program import called_skills, parse_leniently
+from codebotler.core.terminal import shortened
 from codebotler.core.world import World
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.display.wording import BY_PAGE, capitalize
@@ -30,7 +31,7 @@ from codebotler.missions.storage.store import find_interrupted, find_mission
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
-from codebotler.robots.reservation import normalize_address
+from codebotler.robots.reservation import Reservation, normalize_address
 from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.pool import SHARED_POOL
@@ -42,6 +43,7 @@ MAX_PROGRAM_CHARACTERS = 200_000
 MAX_WAIT_SECONDS = 15.0
 """The longest time that a request waits for a change."""
 
+HOLD_POLL_SECONDS = 0.1
 CLEANUP_SECONDS = 2.0
 """The time limit for ending a mission if its program has not begun to run."""
 
@@ -88,6 +90,7 @@ class Console:
         self._lost: MissionSession | None = None  # whose robot may still move
         self._stopping = threading.Thread()  # sends a stop to that robot
         self._began = 0.0  # the time at which the current session began
+        self.used_elsewhere = ""  # a sentence about the process that used the robot at the last STOP
 
     def __enter__(self) -> Self:
         self.interrupted = tuple(find_interrupted(self.home))
@@ -177,13 +180,26 @@ class Console:
                 world=self.world,
                 within=self.within,
             )
+            if self._writer.is_alive():
+                self._writer.join(CLEANUP_SECONDS)
             self._began = time.time()
             session.start()
+            threading.Thread(target=self._obey_other_stops, args=(session, self._began), daemon=True).start()
         if before is not None and not before.view.is_over:
             before.stop_soon("another instruction")
         self.interrupted = ()
         self.notifier.change()
         return session
+
+    def _obey_other_stops(self, session: MissionSession, began: float) -> None:
+        """Stop an approved mission once a person presses STOP in another process that offers this robot."""
+        while not session.view.is_over:
+            with suppress(OSError):
+                is_new = self._hold_file.stat().st_mtime > began and session is not self._stopped
+                if is_new and session.view.is_approved:
+                    session.stop("STOP in another process")
+                    return
+            time.sleep(HOLD_POLL_SECONDS)
 
     def past_of(self, mission: str) -> MissionPast:
         """Read what a mission (an ID or `last`) did and saw. Raise UserError if it cannot be continued."""
@@ -270,8 +286,11 @@ class Console:
         with self._lock:
             session, self._may_recover = self.session, None
             lost = self._forget_loss()
-            stops = not only_moving or lost is not None or (session is not None and session.view.is_approved)
             is_active = session is not None and not session.view.is_over
+            other = "" if is_active or lost is not None else Reservation(self.robot, self.home).holder()
+            self.used_elsewhere = other and f"another tool ({other}) uses the robot"
+            is_approved = session is not None and session.view.is_approved
+            stops = not only_moving or lost is not None or bool(other) or is_approved
             if session is not None and is_active and stops:
                 session.stop_soon(by)
             if lost is not None and not self._stopping.is_alive():
@@ -291,7 +310,7 @@ class Console:
     def warning(self) -> str:
         """Why a lost robot may still move, as a sentence; empty after a person has approved a new mission."""
         lost = self._forget_loss()
-        return "" if lost is None else f"The robot may still move. {capitalize(lost.view.reason)}."
+        return "" if lost is None else f"The robot may still move. {capitalize(shortened(lost.view.reason))}."
 
     def _change(self) -> None:
         """Wake all viewers. Once a robot is lost, have a person approve the next mission."""

@@ -76,7 +76,7 @@ def router(console: Console, face: Face) -> APIRouter:
     async def stop() -> dict[str, Any]:
         """Stop a mission that is approved or runs, and return whether there was one to stop."""
         stopping = console.stop(BY_FACE, only_moving=True, holds=True)
-        return {"stopping": stopping, "warning": bool(console.warning)}
+        return {"stopping": stopping, "warning": bool(console.warning or console.used_elsewhere)}
 
     @routes.websocket("/api/face/live")
     async def live(socket: WebSocket) -> None:

@@ -20,6 +20,7 @@ from codebotler.core.errors import RobotError, UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.paper import SKILLS
 from codebotler.missions.mission import Mission
+from codebotler.robots import own
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Robot, RobotLostError
 from codebotler.robots.open import SpellingRobot, open_robot
 from codebotler.robots.reservation import Reservation
@@ -209,6 +210,64 @@ def test_robot_whose_method_failed_is_stopped_at_each_press(write: Write) -> Non
     robot.cancel()
     robot.connect()
     assert robot.perform("get_current_location", ()) == "3"
+
+
+def test_a_running_async_method_ends_before_stop_has_returned(write: Write) -> None:
+    """Else the method would go on commanding the robot, which never stands still."""
+    robot = write(
+        """
+    speed, brakes = 0.0, 0
+    def rooms(self): return ["hall"]
+    def stop(self):
+        while self.speed: self.speed = 0.0; self.brakes += 1; time.sleep(0.03)
+    async def go_to(self, location):
+        while True: self.speed = 0.5; await asyncio.sleep(0.01)
+"""
+    )
+    robot.connect()
+    with ThreadPoolExecutor() as threads:
+        drive = threads.submit(robot.perform, "go_to", ["hall"])
+        time.sleep(0.05)
+        robot.cancel()
+        with pytest.raises(CancelledError):
+            drive.result(SOON)
+    assert robot._body.brakes < 10  # type: ignore[attr-defined]  # of a class in a file
+
+
+def test_stop_that_blocks_is_not_awaited_for_long(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(own, "STOP_SECONDS", 0.1)
+    robot = write(
+        """
+    gate = threading.Event()
+    def rooms(self): return ["hall"]
+    def stop(self): self.gate.wait(30)
+    def say(self, message): raise ConnectionError("no route")
+"""
+    )
+    robot.connect()
+    with pytest.raises(RobotLostError, match=r"no route.*took too long"):
+        robot.perform("say", ["hello"])
+    robot._body.gate.set()  # type: ignore[attr-defined]  # of a class in a file
+
+
+def test_one_press_calls_stop_once(write: Write, tmp_path: Path) -> None:
+    robot = write(
+        BASE
+        + """
+    def get_current_location(self): return "hall"
+    async def say(self, message): await asyncio.sleep(30)
+"""
+    )
+    mission = Mission(tmp_path, robot.name)
+    mission.draft("def task_program():\n    say('a')\n")
+    mission.check([])
+    mission.approve()
+    with Reservation(robot, tmp_path) as reserved, mission, ThreadPoolExecutor() as threads:
+        run = threads.submit(mission.run, reserved)
+        time.sleep(0.3)
+        mission.stop()
+        run.result(SOON)
+    assert robot._body.stopped == 1  # type: ignore[attr-defined]  # of a class in a file
 
 
 def test_robot_does_not_connect_while_a_stop_is_under_way(write: Write) -> None:

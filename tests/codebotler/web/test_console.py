@@ -818,6 +818,45 @@ def test_stop_reaches_a_lost_robot_while_the_next_mission_connects(tmp_path: Pat
         may_connect.set()
 
 
+def test_stop_reaches_a_robot_that_connects(tmp_path: Path) -> None:
+    robot, may_connect = FakeRobot(lose), threading.Event()
+    robot.connect = lambda: may_connect.wait(30) and None  # type: ignore[assignment,method-assign]  # slowly
+    with make_console(tmp_path, robot) as console:
+        console.begin(MissionOrder(program=HELLO))
+        wait_until(console, lambda view: view.busy == "connecting the robot")
+        time.sleep(0.05)
+        console.stop("a person")
+        wait_until(console, lambda _: robot.cancels > 0, seconds=10)
+        may_connect.set()
+
+
+@pytest.mark.parametrize("only_moving", [True, False])
+def test_stop_reaches_a_mission_of_another_process(tmp_path: Path, *, only_moving: bool) -> None:
+    with make_console(tmp_path, Simulated(WORLD)) as one, make_console(tmp_path) as other:
+        assert not other.stop("a person", only_moving=True, holds=True), "nothing uses the robot"
+        assert not other.is_held
+        begin_and_approve(one, FAR)
+        wait_until(one, lambda view: view.is_running)
+        time.sleep(0.05)  # file systems keep coarse times
+        other.stop("a person", only_moving=only_moving, holds=True)
+        assert "another tool (process" in other.used_elsewhere
+        view = wait_until(one, lambda view: view.is_over)
+        assert (view.state, "another process" in view.reason) == (MissionState.STOPPED, True)
+        assert one.is_held
+
+
+def test_a_warning_is_short_and_visible(tmp_path: Path) -> None:
+    def talk(skill: str, first: str) -> RobotResult:
+        if skill == "say":
+            raise RobotLostError("no words\n\x1b[2J" + "x" * 2_000)
+        return lose(skill, first)
+
+    with make_console(tmp_path, FakeRobot(talk)) as console:
+        run_and_lose(console)
+        assert len(console.warning) < 1_000
+        assert console.warning.isprintable()
+
+
 def test_after_a_loss_a_person_must_approve(tmp_path: Path) -> None:
     with make_console(tmp_path, FakeRobot(lose)) as console:
         run_and_lose(console)

@@ -166,7 +166,7 @@ class RosCaller:
                 self._send_lock.release()
         if worker is not None:
             self._rescue(worker)
-        else:  # nobody asks for this unless the robot was lost, or did not confirm a stop
+        else:  # the robot was lost or did not confirm a stop, or it is being connected
             with self._rescue_lock:
                 self._in_doubt = True
                 self._cancel_all()

@@ -7,7 +7,7 @@
   const [stopAt, robotAt] = [new URL(dataset.stop ?? "api/stop", root), new URL(dataset.robot ?? "api/robot", root)];
   const LOST = "CodeBotler is not responding. Use the robot's emergency stop.";
   const REFUSED = "CodeBotler refused to stop. Use the robot's emergency stop.";
-  const UNSURE = "Stop sent again, but the robot may still move. Stop it by hand.";
+  const UNSURE = "Stop sent, but the robot may still move. Watch it, or stop it by hand.";
   const DISCARDED = "Discarded before it ran.";
   const ENDS = {
     stopped: "The robot has stopped.",
@@ -50,7 +50,7 @@
       const { stopping, warning, detail } = await answer.json();
       if (!answer.ok) throw new Refused(detail);
       if (warning) {
-        say(UNSURE, "bad");
+        say(UNSURE, "bad", true);
       } else if (stopping) {
         say("Stop sent. Waiting for the robot to confirm …", "busy");
         await watch(which);
