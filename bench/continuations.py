@@ -207,8 +207,8 @@ def logged_mission(home: Path, chance: random.Random) -> tuple[Trace, RoomMap, s
     while "while" in program:  # It may wait forever.
         program, world = random_mission(chance)
     mission = Mission(home, "simulated")
-    mission.draft(program)
-    mission.check([])
+    mission.set_program(program)
+    mission.record_check([])
     mission.approve()
     with Reservation(Simulated(world, speed=None), home) as reserved, mission:
         mission.run(reserved, world.robot)

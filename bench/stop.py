@@ -146,8 +146,8 @@ def stop_mission(
         on_event: a listener for the events of the mission.
     """
     with Reservation(robot, home) as reserved, Mission(home, robot.name, on_event=on_event) as mission:
-        mission.draft(PROGRAM)
-        mission.check([])
+        mission.set_program(PROGRAM)
+        mission.record_check([])
         mission.approve()
         running = threading.Thread(target=mission.run, args=(reserved,))
         running.start()

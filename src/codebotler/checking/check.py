@@ -206,7 +206,7 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
     )
 
 
-def hold_within(found: CheckResult, allowed: Contract, skills: SkillTable) -> CheckResult:
+def with_contract_problems(found: CheckResult, allowed: Contract, skills: SkillTable) -> CheckResult:
     """Return a check with a new problem for each skill that may be used beyond the allowed contract."""
     if found.contract is None:
         return found

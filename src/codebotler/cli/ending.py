@@ -35,7 +35,7 @@ ENVIRONMENT = (*DISK_FULL, errno.EIO)  # errors in writing that a different path
 _command = cache(get_command)
 
 
-def obey(app: typer.Typer, name: str) -> NoReturn:
+def run_command_line(app: typer.Typer, name: str) -> NoReturn:
     """Run a command line and end the process.
 
     Errors that a user can cause are printed as one sentence. The exit status is 2 for incorrect input and 1

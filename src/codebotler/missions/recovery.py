@@ -87,7 +87,7 @@ def ask_evidence(robot: Robot, home: Path, past: MissionPast, remark: Callable[[
 
     A real robot is asked where it is, unless it is in use. `remark` receives likely mistakes in its setup.
     """
-    before = [past.was] if past.was else []
+    before = [past.last_position_text] if past.last_position_text else []
     if is_resumable(robot):  # it knows no more than the log
         return [*before, "A simulated robot cannot say. If the step happened, the robot will not repeat it."]
     try:

@@ -12,7 +12,7 @@ from typing import Literal
 from codebotler.checking.check import check_on
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.remaining import remaining_outcomes
-from codebotler.checking.repetition import hold_to_past
+from codebotler.checking.repetition import with_repetition_problems
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.skills.kinds import PICK, PLACE
 from codebotler.core.text.phrases import is_spoken
@@ -69,7 +69,7 @@ class Interruption:
 def rest_prompt(past: MissionPast, request: Prompt) -> Prompt:
     """Return the prompt for the rest of a mission, made from `request`, the prompt for the whole mission."""
     last_step = (past.done or [""])[-1]
-    return request.to_continue(past.program, past.steps, past.why, past.here(past.place), last_step)
+    return request.to_continue(past.program, past.steps, past.why, past.position_text(past.place), last_step)
 
 
 def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[Interruption | FaultResult]:
@@ -113,7 +113,7 @@ def check_rest(worker: Worker, suite: Suite, program: str, room_map: RoomMap, be
     """Check a program for the rest of a mission, which `begun` started. It must not repeat steps."""
     settings = CheckSettings(skills=suite.skills, house_rules=suite.house_rules)
     left = remaining_outcomes(begun, room_map, suite.skills, worker=worker)
-    return hold_to_past(check_on(worker, program, room_map, settings), begun, left)
+    return with_repetition_problems(check_on(worker, program, room_map, settings), begun, left)
 
 
 def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: str | None) -> FaultResult:

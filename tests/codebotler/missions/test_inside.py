@@ -57,8 +57,8 @@ NEVER = rule('not tr.Exists(inside("printer room 2"))', name="never")
 
 def run(folder: Path, robot: Robot, program: str, *rules: Rule) -> tuple[Mission, list[LogLine]]:
     mission = Mission(folder, robot.name)
-    mission.draft(program)
-    mission.check([])
+    mission.set_program(program)
+    mission.record_check([])
     mission.approve()
     with Reservation(robot, folder) as reserved, mission:
         room_map, place = ask_rooms(robot, mission.note, WORLD)

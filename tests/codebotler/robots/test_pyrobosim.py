@@ -506,8 +506,8 @@ def test_rules_about_its_position_hold_along_its_own_route(
     robot = Pyrobosim(world, speed=None)
     formula = parse(f'not tr.Exists(inside("{room}"))', skills=SKILLS.with_skill(POSE_IN_ROOM))
     mission = Mission(tmp_path, robot.name)
-    mission.draft("def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n")
-    mission.check([])
+    mission.set_program("def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n")
+    mission.record_check([])
     mission.approve()
     with Reservation(robot, tmp_path) as reserved, mission:
         room_map, place = ask_rooms(robot, mission.note, world)

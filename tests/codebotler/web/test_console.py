@@ -627,7 +627,7 @@ def test_a_stop_does_not_wait_for_a_check(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_missions_of_a_dead_tool_are_listed(tmp_path: Path) -> None:
     mission = Mission(tmp_path, "simulated")
-    mission.draft(HELLO)
+    mission.set_program(HELLO)
     mission._close()
     with make_console(tmp_path) as console:
         assert [summary.id for summary in console.interrupted] == [mission.id]
