@@ -210,7 +210,7 @@ def with_contract_problems(found: CheckResult, allowed: Contract, skills: SkillT
     """Return a check with a new problem for each skill that may be used beyond the allowed contract."""
     if found.contract is None:
         return found
-    new = [" ".join(filter(None, row)) for row in contract_rows(found.contract.beyond(allowed), skills)]
+    new = [" ".join(filter(None, row)) for row in contract_rows(found.contract.excess_over(allowed), skills)]
     problems = (
         Problem("OutsideContract", f"the program may {what}, which the contract does not allow")
         for what in new

@@ -84,7 +84,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
     if isinstance(error, UnknownInstructionError):
         return 2, _unknown_instruction(error)
     if isinstance(error, ModelError):
-        return (1 if error.may_pass else 2), error.sentence
+        return (1 if error.is_temporary else 2), error.sentence
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
         return (1 if error.errno in ENVIRONMENT else 2), system_sentence(error)
     return None

@@ -46,7 +46,7 @@ class PriorApproval:
         """Whether the program in `view`, which continues the mission `past`, does only what was approved."""
         if view.contract is None or view.problems:
             return False
-        return not view.contract.beyond(self.contract_after(past.trace)).skills
+        return not view.contract.excess_over(self.contract_after(past.trace)).skills
 
     def contract_after(self, trace: Trace) -> Contract:
         """Return the contract minus the calls since the approval: after one `pick`, 2 of 3 are left."""

@@ -190,10 +190,10 @@ def test_more_calls_than_the_contract_allows_are_refused(contracts: Contracts) -
 
 def test_beyond_returns_only_what_the_other_contract_lacks(contracts: Contracts) -> None:
     before, after = contracts(BRING), contracts(BRING.replace('place("coffee")', 'say("Here you are")'))
-    assert not before.beyond(before).skills
-    assert set(after.beyond(before).skills) == {"say"}
-    assert set(before.beyond(after).skills) == {"place"}
-    wider = contracts(BRING.replace('["yes", "no"]', '["yes", "no", "later"]')).beyond(before)
+    assert not before.excess_over(before).skills
+    assert set(after.excess_over(before).skills) == {"say"}
+    assert set(before.excess_over(after).skills) == {"place"}
+    wider = contracts(BRING.replace('["yes", "no"]', '["yes", "no", "later"]')).excess_over(before)
     assert texts_of(wider, "ask") == {"person": ["Ann"], "question": ["Coffee?"], "options": ["later"]}
 
 

@@ -86,7 +86,7 @@ WAYS_TO_PRINT: dict[str, Callable[[str], object]] = {
     "a line": lambda text: terminal.console(highlight=False).print(text, markup=False),
     "what goes on": print_while_busy,
     "a refusal": lambda text: raise_in_command(UserError(text)),
-    "a model's error": lambda text: raise_in_command(ModelError(text, may_pass=False)),
+    "a model's error": lambda text: raise_in_command(ModelError(text, is_temporary=False)),
     "a file's name": lambda text: raise_in_command(FileNotFoundError(2, "No such file", text)),
     "a log": lambda text: logging.getLogger("anybody").warning(text),
     "a warning": lambda text: warnings.warn(text, stacklevel=1),

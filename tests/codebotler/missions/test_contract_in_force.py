@@ -206,7 +206,7 @@ def test_a_session_compares_an_edited_program_with_the_last_one(tmp_path: Path) 
     session.stop("the test")
     assert view.contract is not None
     assert view.earlier is not None
-    assert set(view.contract.beyond(view.earlier).skills) == {"say"}
+    assert set(view.contract.excess_over(view.earlier).skills) == {"say"}
 
 
 def test_a_session_refuses_a_program_beyond_the_contract_of_its_start(tmp_path: Path) -> None:

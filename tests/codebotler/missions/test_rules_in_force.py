@@ -585,7 +585,7 @@ def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: 
 
 def test_a_rule_stays_switched_off_if_no_other_program_comes(tmp_path: Path) -> None:
     def refuses(_name: str) -> Model:
-        raise ModelError("the model is not there", may_pass=False)
+        raise ModelError("the model is not there", is_temporary=False)
 
     order = MissionOrder("Go to the vault.", "refuses", STUBBORN)
     session = MissionSession(robot_in("hall", "vault"), tmp_path, order, open_model=refuses, rules=(VAULT,))

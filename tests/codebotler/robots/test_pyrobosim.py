@@ -30,7 +30,7 @@ from codebotler.missions.preflight import ask_rooms
 from codebotler.missions.storage.log import MissionState
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError
-from codebotler.robots.open import check_readiness
+from codebotler.robots.open import list_readiness
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND, OFFICE, SIMULATION
@@ -488,7 +488,7 @@ def test_command_keeps_a_house_rule(tmp_path: Path) -> None:
 
 
 def test_pyrobosim_is_listed_as_working() -> None:
-    (kind,) = (kind for kind in check_readiness() if kind.name == "pyrobosim")
+    (kind,) = (kind for kind in list_readiness() if kind.name == "pyrobosim")
     assert kind.works
 
 

@@ -176,7 +176,7 @@ class RefusingModel:
         await asyncio.sleep(0)
         self.asked.append(prompt.instruction)
         if prompt.instruction == "bad":
-            raise ModelError("no", may_pass=False, is_refusal=True)
+            raise ModelError("no", is_temporary=False, is_refusal=True)
         return Reply("", prompt.instruction, Usage(), None, None)
 
     async def close(self) -> None:

@@ -118,7 +118,7 @@ def read_options(
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> GenerationRequest:
     """Read the options that `generate` and `run` share. Exit with status 2 if they do not fit together."""
-    from codebotler.models.open import NOT_CALLING, choose_model, kind_of
+    from codebotler.models.open import KINDS_WITHOUT_TOOLS, choose_model, kind_of
     from roboeval.evaluation.agents.conversation import TurnLimits
     from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan
     from roboeval.evaluation.generating.generate import Pace
@@ -139,7 +139,7 @@ def read_options(
         fail("--max-turns, --max-mission-tokens and --within need --mode agent or --mode replan; add one")
     if mode == "replan" and kind_of(chosen.name) == "recorded":
         fail(f"{chosen.name} cannot continue a failed mission; for --mode replan, name a language model")
-    if mode == "agent" and kind_of(chosen.name) in NOT_CALLING:
+    if mode == "agent" and kind_of(chosen.name) in KINDS_WITHOUT_TOOLS:
         fail(f"{chosen.name} cannot call tools; --mode agent needs a chat model, such as openai-chat:NAME")
     return GenerationRequest(chosen.name, settings, plan, pace, suite, out)
 

@@ -180,7 +180,7 @@ class _Generation:
     async def _keep(self, key: CompletionKey, row: dict[str, Any]) -> None:
         line = to_line(row)
         if len(line) > MAX_ROW:
-            raise ModelError(f"the reply is too long to save: {len(line):,} bytes", may_pass=True)
+            raise ModelError(f"the reply is too long to save: {len(line):,} bytes", is_temporary=True)
         self.file.append(line)
         if self.turns is None:
             self.log.kept(key)
