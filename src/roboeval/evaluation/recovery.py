@@ -50,8 +50,8 @@ class Interruption:
 
     result: FaultResult  # which mission, and which fault
     scenario: Scenario = field(repr=False)  # its world, and what its prompt asks for
-    made: Sequence[Call] = field(repr=False)  # the calls before the fault
-    whole: Trace = field(repr=False)  # the trace without the fault
+    earlier_calls: Sequence[Call] = field(repr=False)  # before the fault
+    trace_without_fault: Trace = field(repr=False)
     past: MissionPast = field(repr=False)  # what the mission did, and why it ended
 
     @property
@@ -123,7 +123,8 @@ def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: s
     problems = check_rest(worker, suite, program, one.room_map, one.past.program).problems
     if problems:
         return replace(one.result, end="rejected", why=problems[0].sentence)
-    outcome = worker.run_alone(program, partial(RecordingRobot, one.scenario.world, suite, made=one.made))
+    robot = partial(RecordingRobot, one.scenario.world, suite, earlier_calls=one.earlier_calls)
+    outcome = worker.run_alone(program, robot)
     verdict = judge(outcome, one.scenario)
     faults = [requirement.text for requirement in verdict.failed]
     faults += [] if outcome.error is None else [f"{outcome.error.kind}: {outcome.error.message}"]
@@ -132,7 +133,7 @@ def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: s
         end="passed" if verdict.satisfied else "failed",
         why="" if verdict.satisfied else faults[0],
         steps=len(outcome.trace),
-        repeated=(_effects(outcome.trace) - _effects(one.whole)).total(),
+        repeated=(_effects(outcome.trace) - _effects(one.trace_without_fault)).total(),
     )
 
 

@@ -17,7 +17,7 @@ from codebotler.cli.options import BaseUrlOption, ModelOption, WithinOption, rea
 from codebotler.core.errors import install_command, installed
 from codebotler.core.text.words import counted
 from roboeval.cli.engine_choice import engine_named
-from roboeval.cli.inputs import command, load
+from roboeval.cli.inputs import command, load_suite_option
 from roboeval.cli.options import (
     ConcurrencyOption,
     IsolationOption,
@@ -128,7 +128,7 @@ def read_options(
     chosen = choose_model(model, base_url)
     settings = chosen.add_server(model_settings(**sampling))
     pace = Pace(concurrency, requests_per_minute, token_budget)
-    known = load(suite)
+    known = load_suite_option(suite)
     selected = tasks_to_judge(known, tasks, ablated=False)[0]
     plan = GenerationPlan(known, selected, num_completions or 50)
     if mode != "program":

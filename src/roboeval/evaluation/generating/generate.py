@@ -74,7 +74,7 @@ def generate_run(
             log = RequestLog(run.in_flight, done)
             metadata["possibly_paid_twice"] += log.interrupted
             write_whole(run.about, to_text(metadata))
-            for completion in plan.given():
+            for completion in plan.copied_completions():
                 if completion.key not in done:
                     file.append(to_line(completion.row))
             total = len(plan.keys())
