@@ -202,7 +202,7 @@ def main() -> int:
         if found != (expected := replays[key_of(row)].signature):
             wrong += 1
             print(key_of(row), found, expected)
-    endings = Counter(one.acted.ending for one in completions if one.acted is not None)
+    endings = Counter(one.mission.ending for one in completions if one.mission is not None)
     print(f"{len(completions):,} missions; how they ended: {dict(endings)}")
     print(f"{wrong:,} differ from their programs")
     return int(wrong > 0)

@@ -207,8 +207,8 @@ def logged_mission(home: Path, chance: random.Random) -> tuple[Trace, RoomMap, s
     while "while" in program:  # It may wait forever.
         program, world = random_mission(chance)
     mission = Mission(home, "simulated")
-    mission.draft(program)
-    mission.check([])
+    mission.set_program(program)
+    mission.record_check([])
     mission.approve()
     with Reservation(Simulated(world, speed=None), home) as reserved, mission:
         mission.run(reserved, world.robot)
@@ -263,7 +263,7 @@ def calls_until(worker: Worker, program: str, world: World, events: int) -> tupl
 
 def has_events(world: World, made: Sequence[Call], events: int) -> bool:
     """Return whether calls have so many events."""
-    return len(RecordingRobot(world, SUITE, made=made).trace) >= events
+    return len(RecordingRobot(world, SUITE, earlier_calls=made).trace) >= events
 
 
 def measure_continuations(worker: Worker) -> bool:
@@ -274,12 +274,14 @@ def measure_continuations(worker: Worker) -> bool:
     for number, case in enumerate(cases):
         scenario = SUITE.tasks[case["task"]].scenarios[case["world"]]
         made = calls_until(worker, case["begun"], scenario.world, case["cut"])
-        past = past_of(RecordingRobot(scenario.world, SUITE, made=made), case["begun"])
+        past = past_of(RecordingRobot(scenario.world, SUITE, earlier_calls=made), case["begun"])
         room_map, _ = past.add_to(RoomMap.of(scenario.world), past.place)
         problems = check_rest(worker, SUITE, case["program"], room_map, case["begun"]).problems
         sort = "right" if case["right"] else case["wrong"]
         counts[sort, not problems] += 1
-        outcome = worker.run_alone(case["program"], partial(RecordingRobot, scenario.world, SUITE, made=made))
+        outcome = worker.run_alone(
+            case["program"], partial(RecordingRobot, scenario.world, SUITE, earlier_calls=made)
+        )
         unfit += case["right"] and not judge(outcome, scenario).satisfied
         if os.environ.get("VERBOSE") and case["right"] is bool(problems):
             why = problems[0].sentence if problems else "accepted"
@@ -384,7 +386,7 @@ def find_repeats(crash: Crash, rest: Trace) -> list[str]:
             if is_spoken(one.kind) or one.kind in {PICK, PLACE}
         )
 
-    done, again = keys(RecordingRobot(crash.world, SUITE, made=crash.made).trace), keys(rest)
+    done, again = keys(RecordingRobot(crash.world, SUITE, earlier_calls=crash.made).trace), keys(rest)
     needed = keys(crash.whole)
     return [" ".join(key) for key in again if done[key] and done[key] + again[key] > max(1, needed[key])]
 
@@ -401,7 +403,7 @@ def measure_crashes(worker: Worker) -> bool:
                 rests = (model.rests.get((crash.past.instruction, step)) for model in models)
                 counts["crashes"] += 1
                 for program in filter(None, [one.program, *rests]):
-                    again = partial(RecordingRobot, crash.world, SUITE, made=crash.made)
+                    again = partial(RecordingRobot, crash.world, SUITE, earlier_calls=crash.made)
                     robot = again()
                     room_map, _ = crash.past.add_to(RoomMap.of(crash.world), robot.place)
                     places = tuple((event.place, event.to) for event in room_map.past)

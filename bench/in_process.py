@@ -57,7 +57,7 @@ class Bare(ProgramRun):
 
     def request(self, request: str) -> Any:  # noqa: ANN401, ARG002 - as in ProgramRun
         """End the run, because a limit is reached."""
-        self.spent = True
+        self.has_reached_limit = True
         raise LimitReachedError
 
 
@@ -99,7 +99,8 @@ class Reused(Bare):
         code = compile_program(source)
         if isinstance(code, BaseException):
             return
-        self.robot, self.now, self.spent, self.entered = SimulatedRobot(world, settings), 0.0, False, False
+        self.robot, self.now = SimulatedRobot(world, settings), 0.0
+        self.has_reached_limit = self.entered = False
         self.codes.clear()
         self.left = self.limits.calls
         self.refuel()

@@ -33,7 +33,7 @@ from codebotler.robots.base import (
     RobotResult,
     ignore_feedback,
 )
-from codebotler.robots.open import check_readiness, open_robot
+from codebotler.robots.open import list_readiness, open_robot
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros.connections.connection_file import read_connection
@@ -146,8 +146,8 @@ def stop_mission(
         on_event: a listener for the events of the mission.
     """
     with Reservation(robot, home) as reserved, Mission(home, robot.name, on_event=on_event) as mission:
-        mission.draft(PROGRAM)
-        mission.check([])
+        mission.set_program(PROGRAM)
+        mission.record_check([])
         mission.approve()
         running = threading.Thread(target=mission.run, args=(reserved,))
         running.start()
@@ -254,7 +254,7 @@ def main() -> int:
             report("simulated, Mission.stop", list(by_call(home))),
             report("simulated, Ctrl-C", list(by_signal(home))),
         ]
-        works = {kind.name: kind.works for kind in check_readiness()}
+        works = {kind.name: kind.works for kind in list_readiness()}
         works |= {"nav2": find_missing(ROS2_PYTHON, ROS2_MODULES) == []}
         for name, rows in (("ros1", by_ros1), ("pyrobosim", by_pyrobosim), ("nav2", by_nav2)):
             if works[name]:

@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 
 from codebotler.simulator.pool import shared_pool
 from roboeval.evaluation.recording import SLEEP, RecordingRobot
-from roboeval.suites.families.tasks import TrainedTask, trained_task
+from roboeval.suites.families.tasks import GeneratedTask, trained_task
 from roboeval.training.missions import TrainingMission, load_missions
 from roboeval.training.prompts import load_prompts, program_in
 from roboeval.training.rollouts import Rollout, judge
@@ -53,7 +53,7 @@ def missions() -> list[tuple[dict[str, Any], list[Call]]]:
     return found
 
 
-def calls_of(task: TrainedTask, world: int, program: str) -> list[Call]:
+def calls_of(task: GeneratedTask, world: int, program: str) -> list[Call]:
     """Return the calls that a program makes in a world."""
     worlds = task.suite.tasks[task.name].scenarios
     robot = RecordingRobot(worlds[world % len(worlds)].world, task.suite)

@@ -21,7 +21,7 @@ A_SENTENCE = ("a sentence",)
 ARGUMENTS: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.core.errors.UserError": (("is wrong " * 66,), {"file": Path("a/task.yaml"), "line": 3}),
     "codebotler.models.base.BudgetSpentError": ((1_000, 1_012), {}),
-    "codebotler.models.base.ModelError": (A_SENTENCE, {"may_pass": True, "retry_after": 2.5}),
+    "codebotler.models.base.ModelError": (A_SENTENCE, {"is_temporary": True, "retry_after": 2.5}),
     "codebotler.rtl.semantics.Inconclusive": ((4, 1, Option("3", is_text=False)), {}),
     "codebotler.rtl.source.RtlSyntaxError": ((3, "a bracket is missing"), {}),
     "codebotler.core.errors.RobotError": (("PickInvalidObject", "there is no mug"), {}),

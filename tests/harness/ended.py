@@ -16,8 +16,8 @@ def failed_mission(home: Path, program: str, world: World, instruction: str = "B
     """The folder of a mission that ended early."""
     robot = Simulated(world, speed=None)
     mission = Mission(home, "simulated", instruction)
-    mission.draft(program)
-    mission.check([])
+    mission.set_program(program)
+    mission.record_check([])
     mission.approve()
     with Reservation(robot, home) as reserved, mission:
         mission.run(reserved, world.robot)

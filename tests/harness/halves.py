@@ -8,7 +8,7 @@ import json
 
 from PIL import Image
 
-from codebotler.perception import image_of
+from codebotler.perception import decode_image
 from server import Request
 
 RED, BLUE = (254, 0, 0), (0, 0, 254)
@@ -36,7 +36,7 @@ def rows(order: str, padding: int = 0) -> bytes:
 def sees(request: Request) -> str:
     """What the model replies: the picture must have arrived with its colours in their places."""
     text, picture = request.body["messages"][1]["content"]
-    image = image_of(base64.b64decode(picture["image_url"]["url"].partition(",")[2]))
+    image = decode_image(base64.b64decode(picture["image_url"]["url"].partition(",")[2]))
     left, right = image.getpixel((8, 16)), image.getpixel((56, 16))
     assert isinstance(left, tuple)
     assert isinstance(right, tuple)
@@ -46,7 +46,7 @@ def sees(request: Request) -> str:
 
 def has_frame(picture: bytes) -> bool:
     """Whether a picture has a frame around its blue half: yellow at its edge, and blue within."""
-    shown = image_of(picture)
+    shown = decode_image(picture)
     edge, inside = shown.getpixel((33, 16)), shown.getpixel((48, 16))
     assert isinstance(edge, tuple)
     assert isinstance(inside, tuple)

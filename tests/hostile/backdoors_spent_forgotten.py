@@ -4,9 +4,9 @@
 
 
 def task_program():
-    run = [c.cell_contents for c in say.__globals__["perform"].__closure__ if hasattr(c.cell_contents, "spent")][0]
+    run = [c.cell_contents for c in say.__globals__["perform"].__closure__ if hasattr(c.cell_contents, "has_reached_limit")][0]
     while True:
-        run.spent = False
+        run.has_reached_limit = False
         try:
             say("a")
         except BaseException:

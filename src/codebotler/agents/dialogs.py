@@ -13,7 +13,7 @@ from mcp.server.mcpserver.resolve import Elicit, Resolve
 from pydantic import BaseModel, Field
 
 from codebotler.agents.gatekeeper import READING_PAST, Gatekeeper
-from codebotler.agents.reports import question, which_question
+from codebotler.agents.reports import approval_text, choice_text
 from codebotler.candidates.question import ClarifyingQuestion
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
@@ -78,7 +78,7 @@ def ask_which_behaviour(
     """Have the client ask its person for a behaviour, or return NotAsked if the client has no dialogs."""
     if not gatekeeper_of(ctx).asks_client or not _has_dialogs(ctx):
         return NotAsked()
-    return Elicit(f"Mission {question.session.view.id}: {which_question(question.asked)}", Choice)
+    return Elicit(f"Mission {question.session.view.id}: {choice_text(question.asked)}", Choice)
 
 
 async def read_last_past(ctx: AgentContext) -> MissionPast:
@@ -87,7 +87,7 @@ async def read_last_past(ctx: AgentContext) -> MissionPast:
     with as_tool_errors():
         if console.view.past is not None and not console.view.is_over:
             return console.view.past
-        return await gatekeeper.alone(READING_PAST, partial(console.past_of, "last"))
+        return await gatekeeper.run_exclusively(READING_PAST, partial(console.past_of, "last"))
 
 
 def ask_whether(
@@ -97,8 +97,8 @@ def ask_whether(
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NotAsked()
-    asked = f"Mission {past.mission}: {past.question}\n{past.was}".rstrip()  # the ID binds the answer to it
-    return Elicit(asked, StepWord)  # without the robot's own word, since an agent may not occupy the robot
+    text = f"Mission {past.mission}: {past.unsure_step_text}\n{past.last_position_text}".rstrip()
+    return Elicit(text, StepWord)  # binds the answer to the mission; an agent may not ask the robot itself
 
 
 AFTER_HOLD = "After a STOP or a lost robot, your yes also lets agents act within their contract again."
@@ -129,7 +129,7 @@ def ask_person(
     may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)
     if not may_ask or gatekeeper.approves_alone(session):
         return NotAsked()
-    text = question(view, gatekeeper.console.robot, gatekeeper.contract_text(view.contract))
+    text = approval_text(view, gatekeeper.console.robot, gatekeeper.contract_text(view.contract))
     if gatekeeper.console.is_held:
         text = f"{gatekeeper.console.warning}\n{AFTER_HOLD}\n\n{text}".lstrip()
     return Elicit(text, Consent)

@@ -175,7 +175,7 @@ class Gatekeeper:
             raise UserError(made.programless.sentence)
         return self.check(made.reply.program)
 
-    async def alone(self, kind: str, work: Callable[[], _Made]) -> _Made:
+    async def run_exclusively(self, kind: str, work: Callable[[], _Made]) -> _Made:
         """Return the result of slow work on a new thread. Raise MissionError if work of this `kind` goes on.
 
         The few threads of the SDK and of the event loop stay free for people, and a person's check never

@@ -80,7 +80,7 @@ def report_check(check: CheckResult, program: str, problems: Sequence[str], cont
     )
 
 
-def question(view: SessionView, robot: Robot, contract: str) -> str:
+def approval_text(view: SessionView, robot: Robot, contract: str) -> str:
     """Return the text of the dialog to approve a program: its problems, its contract and an example run."""
     rules = listed([shortened(rule.name) for rule in view.rules_in_force])
     where = f" at {shortened(robot.address)}" if robot.address else ""
@@ -103,7 +103,7 @@ def question(view: SessionView, robot: Robot, contract: str) -> str:
     return "\n\n".join(filter(None, parts))
 
 
-def which_question(asked: ClarifyingQuestion) -> str:
+def choice_text(asked: ClarifyingQuestion) -> str:
     """Return the text of the dialog to choose a behaviour, with numbered options."""
     facts = f"Suppose that {listed([*map(shortened, asked.facts)])}." if asked.facts else ""
     options = (

@@ -87,7 +87,7 @@ def _add_resources(server: MCPServer[Gatekeeper], gatekeeper: Gatekeeper) -> Non
 
     async def read(work: Callable[[], str]) -> str:
         try:
-            return await gatekeeper.alone(READING_PAST, work)
+            return await gatekeeper.run_exclusively(READING_PAST, work)
         except UserError as error:
             raise ResourceNotFoundError(error.sentence) from None
         except MissionError as error:

@@ -81,7 +81,7 @@ async def check_program(program: _Program, ctx: AgentContext) -> CheckReport:
     """
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors():
-        return await gatekeeper.alone("check", partial(gatekeeper.check, program))
+        return await gatekeeper.run_exclusively("check", partial(gatekeeper.check, program))
 
 
 async def write_program(instruction: _Instruction, ctx: AgentContext) -> CheckReport:
@@ -99,7 +99,8 @@ async def write_program(instruction: _Instruction, ctx: AgentContext) -> CheckRe
         author = ModelAuthor(console.open_model, console.models[0])
         prompt = prompt_of(asked, console.robot, repair=False)
         try:
-            return await gatekeeper.alone("request to the model", partial(gatekeeper.write, author, prompt))
+            work = partial(gatekeeper.write, author, prompt)
+            return await gatekeeper.run_exclusively("request to the model", work)
         finally:
             author.cancel()
 
@@ -155,7 +156,7 @@ async def continue_mission(
         if isinstance(answer, AcceptedElicitation) and not isinstance(answer.data, NotAsked):
             past = past.resolve(happened=answer.data.answer == "it happened")
         if past.unsure is not None:
-            raise UserError(f"{past.question}; a person must say so, on the page {gatekeeper.page}")
+            raise UserError(f"{past.unsure_step_text}; a person must say so, on the page {gatekeeper.page}")
         if not program.strip() and not past.instruction:
             raise UserError("this mission has no instruction; send a program for the rest")
         author = agent_name(ctx) if program.strip() else ""

@@ -206,11 +206,11 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
     )
 
 
-def hold_within(found: CheckResult, allowed: Contract, skills: SkillTable) -> CheckResult:
+def with_contract_problems(found: CheckResult, allowed: Contract, skills: SkillTable) -> CheckResult:
     """Return a check with a new problem for each skill that may be used beyond the allowed contract."""
     if found.contract is None:
         return found
-    new = [" ".join(filter(None, row)) for row in contract_rows(found.contract.beyond(allowed), skills)]
+    new = [" ".join(filter(None, row)) for row in contract_rows(found.contract.excess_over(allowed), skills)]
     problems = (
         Problem("OutsideContract", f"the program may {what}, which the contract does not allow")
         for what in new

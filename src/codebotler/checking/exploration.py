@@ -82,11 +82,11 @@ class ExploringGuard(RuleGuard):
         """Record the rules that the next event, which is one of `attempts`, would break."""
         self._keep(self.find_violations(attempts, is_drive=is_drive))
 
-    def happened(self, event: Event) -> None:
+    def judge_result(self, event: Event) -> None:
         """Add an event to the history, and record the rules that its result broke."""
         self._keep(self.add_event(event))
 
-    def at_end(self) -> None:
+    def find_first_unkept(self) -> None:
         """Record the rules that are broken if the mission ends now."""
         self._keep(self.find_unkept())
 

@@ -76,7 +76,7 @@ class RuleProof:
     if_skills_fail: bool = True
 
     @property
-    def words(self) -> str:
+    def in_words(self) -> str:
         """The verdict in words, such as "can be broken, as in imagined world 3"."""
         if self.sample is not None:
             return f"can be broken, as in imagined world {self.sample}"

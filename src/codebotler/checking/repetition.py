@@ -39,7 +39,9 @@ EMPTY_WORDS = frozenset(
 _PUNCTUATION = re.compile(r"[^\w\s]+")
 
 
-def hold_to_past(found: CheckResult, begun: str, remaining: Sequence[Outcome] = ()) -> CheckResult:
+def with_repetition_problems(
+    found: CheckResult, begun: str, remaining: Sequence[Outcome] = ()
+) -> CheckResult:
     """Return a check with further problems: steps that were done already, and a thing that is not put down.
 
     The program may wait without end if the first program does, since what both wait for may still come.

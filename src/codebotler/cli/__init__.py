@@ -1,6 +1,6 @@
 """The command line of CodeBotler.
 
-Start with `app.py`, which declares the commands. RoboEval also uses `obey` and the options.
+Start with `app.py`, which declares the commands. RoboEval also uses `run_command_line` and the options.
 """
 
 import sys

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from codebotler.cli import options
-from codebotler.cli.ending import obey
+from codebotler.cli.ending import run_command_line
 from codebotler.cli.model_options import inherit_options, model_settings
 from codebotler.cli.operating.commands import (
     connect,
@@ -104,7 +104,7 @@ def check(
     The check runs the program in imagined worlds. The exit status is 1 if there are problems.
     """
     from codebotler.checking import check
-    from codebotler.checking.check import hold_within
+    from codebotler.checking.check import with_contract_problems
     from codebotler.cli.programs.check import check_view, contract_view, read_program, write_contract
     from codebotler.cli.programs.rules import rules_for
     from codebotler.core.skills.files import skills_from
@@ -131,7 +131,7 @@ def check(
             house_rules=house_rules,
             explores=contract or bool(house_rules) or save_contract is not None or within is not None,
         )
-    found = found if allowed is None else hold_within(found, allowed, table)
+    found = found if allowed is None else with_contract_problems(found, allowed, table)
     write_contract(save_contract, found.contract)
     name = "the program" if program == "-" else program
     print_found(
@@ -276,7 +276,7 @@ app.command("mcp")(serve_agents)
 def main() -> None:
     """Run the command line of CodeBotler."""
     with report_problems():
-        obey(app, "codebotler")
+        run_command_line(app, "codebotler")
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ ENVIRONMENT = (*DISK_FULL, errno.EIO)  # errors in writing that a different path
 _command = cache(get_command)
 
 
-def obey(app: typer.Typer, name: str) -> NoReturn:
+def run_command_line(app: typer.Typer, name: str) -> NoReturn:
     """Run a command line and end the process.
 
     Errors that a user can cause are printed as one sentence. The exit status is 2 for incorrect input and 1
@@ -84,7 +84,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
     if isinstance(error, UnknownInstructionError):
         return 2, _unknown_instruction(error)
     if isinstance(error, ModelError):
-        return (1 if error.may_pass else 2), error.sentence
+        return (1 if error.is_temporary else 2), error.sentence
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
         return (1 if error.errno in ENVIRONMENT else 2), system_sentence(error)
     return None

@@ -323,7 +323,7 @@ def _check_value(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator
         return
     if type(value) is tuple or not parameter.type.fits(value):
         is_choice = type(value).__name__ == parameter.type.base and not parameter.type.is_list
-        message = f"{skill.name}: {parameter.name} must be {parameter.words}, not {value!r:.60}"
+        message = f"{skill.name}: {parameter.name} must be {parameter.in_words}, not {value!r:.60}"
         yield Flaw(node.lineno, "ValueError" if is_choice else "TypeError", message)
 
 

@@ -240,7 +240,7 @@ def _truth(statement: str, value: object, skills: SkillTable | None) -> str:
     if skills is not None and len(skills) > len(SKILLS):
         _expect_possible(name, given, value, skills)
         taken = zip(skills[name].parameters, given, strict=True)
-        given = [plain(parameter.type.wanted(one)) for parameter, one in taken]
+        given = [plain(parameter.type.convert(one)) for parameter, one in taken]
     return written_call(name, given)
 
 
@@ -265,5 +265,5 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
     kinds = [kind for kind, _ in row.fails]
     if value in kinds or (row.returns.base is not None and row.returns.fits(value)):
         return
-    returned = [] if row.returns.base is None else [row.returns.words]
+    returned = [] if row.returns.base is None else [row.returns.in_words]
     raise ValueError(f"{name} cannot return {value!r}; write {listed([*returned, *kinds], 'or')}")

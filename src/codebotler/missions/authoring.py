@@ -77,7 +77,7 @@ def prompt_of(view: SessionView, robot: Robot, *, repair: bool) -> Prompt:
     if past is not None:
         place = past.place if room_map is None else room_map.start
         prompt = prompt.to_continue(
-            past.program, past.steps, past.why, past.here(place), (past.done or [""])[-1]
+            past.program, past.steps, past.why, past.position_text(place), (past.done or [""])[-1]
         )
     if repair and view.problems:
         return prompt.after(view.program, view.problems)

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from codebotler.checking.check import check, hold_within
+from codebotler.checking.check import check, with_contract_problems
 from codebotler.checking.remaining import remaining_outcomes
-from codebotler.checking.repetition import hold_to_past
+from codebotler.checking.repetition import with_repetition_problems
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.preflight import missing_skills, unknown_rooms
 from codebotler.robots.base import Robot
@@ -38,11 +38,11 @@ def examine_draft(
     if view.past is not None:
         begun, before = view.past.program, view.past.before
         left = remaining_outcomes(begun, found.room_map, skills, first=before)
-        found = hold_to_past(found, begun, left)
+        found = with_repetition_problems(found, begun, left)
     if order.drive is not None and program == order.program:
         found = replace(found, contract=order.contract, proofs=(), samples=())
     if view.within is not None:
-        found = hold_within(found, view.within, skills)
+        found = with_contract_problems(found, view.within, skills)
     known = None if found.problems else view.room_map
     return {
         "check": found,

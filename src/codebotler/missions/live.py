@@ -203,7 +203,7 @@ class LiveRobot:
         if is_drive:
             seen = self._resolve_drive(guard, seen, failed=failed)
         with self._enforcing():
-            guard.happened(seen)
+            guard.judge_result(seen)
 
     def _resolve_drive(self, guard: RuleGuard, event: Event, *, failed: bool) -> Event:
         """Return a drive with the name of its destination. If a rule depends on the name, ask the robot."""
@@ -234,7 +234,7 @@ class LiveRobot:
             return
         before, self._at = self._at or at, at
         with suppress(StoppedError, RuleViolationError), self._enforcing():  # keep errors off robot threads
-            self._guard.moved(before, at, self._held)
+            self._guard.record_drive(before, at, self._held)
 
     @contextmanager
     def _enforcing(self) -> Iterator[None]:
@@ -259,7 +259,7 @@ class LiveRobot:
 
     def report_unkept(self) -> str:
         """If ending now breaks a rule, log this and return a sentence that says so; otherwise return ""."""
-        broken = None if self._guard is None else self._guard.at_end()
+        broken = None if self._guard is None else self._guard.find_first_unkept()
         if broken is None:
             return ""
         self._write_event("rule", **_rule_entry(broken))

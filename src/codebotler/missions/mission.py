@@ -137,7 +137,7 @@ class Mission:
         """Whether the mission has reached a final state."""
         return self.summary.has_ended
 
-    def draft(self, program: str, model: str = "") -> None:
+    def set_program(self, program: str, model: str = "") -> None:
         """Set the program and the `model` that wrote it, if any. Raise MissionError after an approval."""
         with self._writing:
             self._step(
@@ -145,7 +145,7 @@ class Mission:
             )
             self._has_program = True
 
-    def check(self, problems: Sequence[str]) -> None:
+    def record_check(self, problems: Sequence[str]) -> None:
         """Record the problems that a program check found. Raise MissionError if there is no program."""
         with self._writing:
             if not self._has_program:
@@ -183,7 +183,7 @@ class Mission:
         """Add a sentence to the log."""
         self._write("log", text=text)
 
-    def show_map(self, world: World) -> None:
+    def log_map(self, world: World) -> None:
         """Add the rooms of a world to the log, as a `map` event."""
         self._write("map", **map_data(world))
 

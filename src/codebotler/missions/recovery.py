@@ -46,7 +46,7 @@ class PriorApproval:
         """Whether the program in `view`, which continues the mission `past`, does only what was approved."""
         if view.contract is None or view.problems:
             return False
-        return not view.contract.beyond(self.contract_after(past.trace)).skills
+        return not view.contract.excess_over(self.contract_after(past.trace)).skills
 
     def contract_after(self, trace: Trace) -> Contract:
         """Return the contract minus the calls since the approval: after one `pick`, 2 of 3 are left."""
@@ -87,7 +87,7 @@ def ask_evidence(robot: Robot, home: Path, past: MissionPast, remark: Callable[[
 
     A real robot is asked where it is, unless it is in use. `remark` receives likely mistakes in its setup.
     """
-    before = [past.was] if past.was else []
+    before = [past.last_position_text] if past.last_position_text else []
     if is_resumable(robot):  # it knows no more than the log
         return [*before, "A simulated robot cannot say. If the step happened, the robot will not repeat it."]
     try:

@@ -66,9 +66,9 @@ class NotingGuard(RuleGuard):
             self.violations.append(broken)
             raise
 
-    def at_end(self) -> RuleViolationError | None:
+    def find_first_unkept(self) -> RuleViolationError | None:
         """If ending now would break a rule, collect and return this violation; otherwise return None."""
-        broken = super().at_end()
+        broken = super().find_first_unkept()
         self.violations += [broken] if broken else []
         return broken
 
@@ -145,5 +145,5 @@ def _log_effect(events: Sequence[LogLine], guard: RuleGuard, robot: LoggedRobot)
             pass
     if state["state"] != MissionState.DONE:
         return RuleEffect(str(state["state"]), line=state.get("line"), error=str(state.get("reason", "")))
-    unkept = guard.at_end()
+    unkept = guard.find_first_unkept()
     return RuleEffect("finished") if unkept is None else RuleEffect.of(unkept, "finished")

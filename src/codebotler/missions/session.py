@@ -33,7 +33,7 @@ from codebotler.missions.preflight import (
 )
 from codebotler.missions.stop import StopButton
 from codebotler.missions.storage.log import MissionState
-from codebotler.missions.storage.past import expect_rest
+from codebotler.missions.storage.past import expect_continuable
 from codebotler.missions.storage.store import find_mission
 from codebotler.models.base import Model, ModelError
 from codebotler.models.recorded import UnknownInstructionError
@@ -246,14 +246,14 @@ class MissionSession(SharedView):
             name, instruction = self._robot.name, self._order.instruction
             if (past := self._order.past) is not None:
                 # Another mission may have done the rest since this past was read.
-                expect_rest(find_mission(self._home, past.mission))
+                expect_continuable(find_mission(self._home, past.mission))
             with Mission(self._home, name, instruction, self._add_event, self._stop_button) as mission:
                 self._mission = mission
                 if past is not None:
                     mission.continue_from(past)
                 self._show(id=mission.id)
                 if self._world is not None:
-                    mission.show_map(self._world)
+                    mission.log_map(self._world)
                 if past is not None:
                     resume_robot(self._robot, past)
                 room_map, place = self._prepare_rooms()
@@ -396,9 +396,9 @@ class MissionSession(SharedView):
             self._change(program=program, error="", reply="", **UNCHECKED)
             view = self._view
         try:
-            mission.draft(program, view.author)
+            mission.set_program(program, view.author)
             found = examine_draft(program, view, self._order, self._robot, self._is_wanted)
-            mission.check(replace(view, **found).problems)
+            mission.record_check(replace(view, **found).problems)
         except (MissionError, UnwantedCheckError):
             if self._is_wanted():
                 raise

@@ -124,20 +124,20 @@ class ModelError(Exception):
 
     Args:
         sentence: the cause and, if known, the fix. It must not contain API keys.
-        may_pass: whether the same request may succeed later.
+        is_temporary: whether the same request may succeed later.
         retry_after: how many seconds to wait, if the server asks for a delay, else None.
         is_refusal: whether the server rejected this prompt, rather than failing.
     """
 
     def __init__(
-        self, sentence: str, *, may_pass: bool, retry_after: float | None = None, is_refusal: bool = False
+        self, sentence: str, *, is_temporary: bool, retry_after: float | None = None, is_refusal: bool = False
     ) -> None:
         super().__init__(sentence)
-        self.sentence, self.may_pass, self.retry_after = sentence, may_pass, retry_after
+        self.sentence, self.is_temporary, self.retry_after = sentence, is_temporary, retry_after
         self.is_refusal = is_refusal
 
     def __reduce__(self) -> tuple[object, ...]:
-        return partial(type(self), may_pass=self.may_pass), (self.sentence,), vars(self)
+        return partial(type(self), is_temporary=self.is_temporary), (self.sentence,), vars(self)
 
 
 class BudgetSpentError(Exception):

@@ -127,7 +127,7 @@ class LocalModel:
         length = len(self._tokens(text)["input_ids"])
         if length >= self.longest:
             sentence = f"the prompt has {length:,} tokens; the model takes at most {self.longest:,}"
-            raise model_error(self.name, sentence, may_pass=False)
+            raise model_error(self.name, sentence, is_temporary=False)
         first = number - number % SEED_BLOCK
         numbers = range(first, first + SEED_BLOCK) if self.is_seeded else [number]
         loop = asyncio.get_running_loop()
@@ -148,7 +148,7 @@ class LocalModel:
             try:
                 endings = await asyncio.to_thread(self._endings, batch, seed)
             except Exception as error:  # noqa: BLE001 - each request raises it
-                endings = [model_error(self.name, error, may_pass=False)] * len(batch)
+                endings = [model_error(self.name, error, is_temporary=False)] * len(batch)
             for job, ending in zip(batch, endings, strict=True):
                 if isinstance(ending, ModelError):
                     self._unclaimed.pop((job.text, job.number), None)  # so that a later request tries again
@@ -178,10 +178,10 @@ class LocalModel:
         try:
             return self._generate(batch, seed)
         except _CancelledError:
-            return [model_error(self.name, "the request was cancelled", may_pass=True)] * len(batch)
+            return [model_error(self.name, "the request was cancelled", is_temporary=True)] * len(batch)
         except torch.cuda.OutOfMemoryError:
             if len(batch) == 1:
-                return [model_error(self.name, "not enough memory; use a shorter prompt", may_pass=False)]
+                return [model_error(self.name, "not enough memory; use a shorter prompt", is_temporary=False)]
         torch.cuda.empty_cache()
         half = len(batch) // 2
         later = None if seed is None else seed + half

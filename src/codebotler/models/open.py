@@ -18,7 +18,7 @@ from codebotler.models.sampling import SamplingSettings
 
 MODEL_VARIABLE = "CODEBOTLER_MODEL"
 DEFAULT_MODEL = "recorded:careful"
-NOT_CALLING = frozenset({"recorded", "completions", "hf"})
+KINDS_WITHOUT_TOOLS = frozenset({"recorded", "completions", "hf"})
 """The kinds of models that cannot call tools."""
 
 MODEL_FORMS = (

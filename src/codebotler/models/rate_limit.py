@@ -166,7 +166,9 @@ def _retry_after(state: RetryCallState) -> float:
 
 
 def _is_retryable(error: BaseException) -> bool:
-    return isinstance(error, ModelError) and error.may_pass and (error.retry_after or 0) <= MAX_RETRY_AFTER
+    return (
+        isinstance(error, ModelError) and error.is_temporary and (error.retry_after or 0) <= MAX_RETRY_AFTER
+    )
 
 
 def _estimate(prompt: Prompt, length: int) -> int:

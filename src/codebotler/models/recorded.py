@@ -77,7 +77,7 @@ class UnknownInstructionError(ModelError):
         short = partial(brief, most=MAX_SHOWN_CHARACTERS)
         similar = " or ".join(f'"{short(known)}"' for known in closest)
         sentence = f'{model} has no program for "{short(instruction)}"; try {similar}'
-        super().__init__(sentence, may_pass=False)
+        super().__init__(sentence, is_temporary=False)
         self.model, self.instruction, self.closest = model, instruction, tuple(closest)
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -119,7 +119,7 @@ class RecordedModel:
         program = self.rests.get((instruction, last_step))
         if program is None:
             what = f"{self.name} has no program for the rest of this mission after this step: {last_step}"
-            raise ModelError(f"{what}; choose a language model, or write that program", may_pass=False)
+            raise ModelError(f"{what}; choose a language model, or write that program", is_temporary=False)
         return program
 
     async def close(self) -> None:

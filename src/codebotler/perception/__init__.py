@@ -1,17 +1,17 @@
 """Detectors, which look for an object or a person in an image, and functions that read images."""
 
 from codebotler.perception.base import Detector, PerceptionError, Sighting
-from codebotler.perception.image import boxed, image_from_ros, image_of, jpeg_of, read_image
+from codebotler.perception.image import decode_image, encode_jpeg, image_from_ros, read_image, with_box
 from codebotler.perception.open import open_detector
 
 __all__ = [
     "Detector",
     "PerceptionError",
     "Sighting",
-    "boxed",
+    "decode_image",
+    "encode_jpeg",
     "image_from_ros",
-    "image_of",
-    "jpeg_of",
     "open_detector",
     "read_image",
+    "with_box",
 ]

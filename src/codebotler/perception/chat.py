@@ -14,7 +14,7 @@ from codebotler.models.base import Model, ModelError
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.servers.server_errors import error_text
 from codebotler.perception.base import PerceptionError, Sighting, clean_label
-from codebotler.perception.image import jpeg_of
+from codebotler.perception.image import encode_jpeg
 from codebotler.prompts import PictureMessage, Prompt, PromptMessage
 
 DETECTOR_PROMPT = Path(__file__).with_name("detector.txt").read_text()
@@ -35,7 +35,7 @@ class ChatDetector:
 
     def look(self, image: Image, label: str) -> Sighting:
         """Look for a label in an image. Raise PerceptionError if the model fails or 3 replies are invalid."""
-        question = PictureMessage("user", json.dumps(clean_label(label)), jpeg_of(image))
+        question = PictureMessage("user", json.dumps(clean_label(label)), encode_jpeg(image))
         messages: tuple[PromptMessage, ...] = (PromptMessage("system", DETECTOR_PROMPT), question)
         fault = text = ""
         for number in range(MAX_REPLIES):

@@ -31,7 +31,7 @@ ENCODINGS: Mapping[str, tuple[str, str]] = {
 """Maps each supported encoding of sensor_msgs/Image to Pillow's mode and the order of a pixel's bytes."""
 
 
-def image_of(data: bytes, name: str = "the picture") -> Image.Image:
+def decode_image(data: bytes, name: str = "the picture") -> Image.Image:
     """Decode a JPEG, PNG or WebP file to an upright RGB image. If that fails, raise UserError for `name`."""
     if not data:
         raise UserError(f"{name} is empty; use a JPEG, PNG or WebP image")
@@ -53,7 +53,7 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
 
 def read_image(path: Path) -> Image.Image:
     """Read a JPEG, PNG or WebP file as an upright RGB image. Raise UserError if that fails."""
-    return image_of(read_bytes(path, MAX_IMAGE_BYTES + 1), str(path))
+    return decode_image(read_bytes(path, MAX_IMAGE_BYTES + 1), str(path))
 
 
 def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> Image.Image:
@@ -68,7 +68,7 @@ def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> 
     match message:
         case {"encoding": str(encoding), "width": int(width), "height": int(height), "step": int(step)}:
             return _decode_raw(encoding, (width, height), step, data, name)
-    return image_of(data, name)
+    return decode_image(data, name)
 
 
 def _decode_raw(encoding: str, size: tuple[int, int], step: int, data: bytes, name: str) -> Image.Image:
@@ -83,7 +83,7 @@ def _decode_raw(encoding: str, size: tuple[int, int], step: int, data: bytes, na
     return _to_rgb(Image.frombytes(mode, size, data[: step * size[1]], "raw", order, step))
 
 
-def jpeg_of(image: Image.Image) -> bytes:
+def encode_jpeg(image: Image.Image) -> bytes:
     """Encode an image as a JPEG without metadata, scaled down to at most 1,024 pixels on each side."""
     smaller = _to_rgb(image)
     smaller.thumbnail((LONGEST_SIDE, LONGEST_SIDE))
@@ -92,7 +92,7 @@ def jpeg_of(image: Image.Image) -> bytes:
     return file.getvalue()
 
 
-def boxed(image: Image.Image, sighting: Sighting) -> Image.Image:
+def with_box(image: Image.Image, sighting: Sighting) -> Image.Image:
     """Return a copy of an image, with a yellow frame around the sighting's box if there is one."""
     drawn = image.copy()
     if sighting.box is None:

@@ -69,7 +69,7 @@ def open_with_face(name: str, options: Options, face: Face) -> Robot:
     return RobotWithFace(silent, face, options.skills.without(lacking))
 
 
-def check_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:
+def list_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:
     """Return for each kind of robot whether it can be used here. `ros_python` is the Python that has ROS."""
     return [_readiness(name, ros_python) for name in ROBOT_KINDS]
 

@@ -119,7 +119,7 @@ class OwnRobot:
         row = self.skills[skill]
         if skill not in self._methods:
             raise RobotError("SkillWithoutMethod", self.missing[skill])
-        given = [parameter.type.wanted(one) for parameter, one in zip(row.parameters, arguments, strict=True)]
+        given = [each.type.convert(one) for each, one in zip(row.parameters, arguments, strict=True)]
         self._is_busy = True
         try:
             result: RobotResult = plain(self._finish(self._methods[skill](*given)))

@@ -246,7 +246,7 @@ class _Parser(FormulaSource):
         ):
             raise self.expected("True or False", node)
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.isalpha():
-            raise self.expected(f"{wanted.words}, or a regex for it", node)
+            raise self.expected(f"{wanted.in_words}, or a regex for it", node)
         match node:
             case ast.Constant(int() | float() as value) | ast.UnaryOp(
                 ast.USub(), ast.Constant(int() | float() as value)

@@ -135,7 +135,7 @@ class Ledger:
 
 def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
     """Return the outcome, or a robot error instead if the program finished but broke a rule by ending."""
-    unkept = robot.guard.at_end() if robot.guard is not None and outcome.error is None else None
+    unkept = robot.guard.find_first_unkept() if robot.guard is not None and outcome.error is None else None
     if unkept is None:
         return outcome
     return Outcome(Status.ROBOT_ERROR, outcome.trace, RunError(unkept.kind, str(unkept)))

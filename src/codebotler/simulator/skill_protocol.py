@@ -63,7 +63,7 @@ class SkillProtocol:
             cause, fault = cause_of_death(self.child.end_gently(), seconds)
             return Outcome(cause, self.robot.trace, fault)
         self.child.kill()
-        self.child.hang_up()
+        self.child.close_channel()
         match final:
             case {"now": float(now)} if self.ledger.limit is None and not self.robot.is_live:
                 self.ledger.let_time_pass(now)  # it slept before it failed
@@ -94,7 +94,7 @@ class SkillProtocol:
 
     def _answer(self, name: str, values: list[object], now: float) -> SkillAnswer:
         if self.robot.is_live:
-            self.child.reset_patience()
+            self.child.restart_wait()
         elif self.ledger.limit is None:
             self.ledger.let_time_pass(now)
         if self.ledger.limit is not None:
@@ -118,7 +118,7 @@ class SkillProtocol:
 def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
     """Return the name and the parameters of each of a robot's skills, as a program's process needs them."""
     return tuple(
-        (skill.name, tuple((p.name, p.kind, p.type.choices, p.words) for p in skill.parameters))
+        (skill.name, tuple((p.name, p.kind, p.type.choices, p.in_words) for p in skill.parameters))
         for skill in robot.skills.rows
     )
 

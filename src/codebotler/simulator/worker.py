@@ -173,11 +173,11 @@ class Worker:
             return
         server = self._fork_servers.get(BatchServer)
         if not isinstance(server, BatchServer) or server.has_ended:  # its child has ended with the server
-            child.hang_up()
+            child.close_channel()
             return
         with suppress(LostProcessError):  # the server may end at any moment
             child.kill()
-        child.hang_up()
+        child.close_channel()
         server.fork_ahead()
 
     # --- one child per run

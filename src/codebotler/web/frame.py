@@ -89,7 +89,7 @@ class PlainText(TextElement):
         self.classes(kind)
         self.props("dir=auto")
 
-    def say(self, text: str) -> None:
+    def show_text(self, text: str) -> None:
         """Replace the text, or hide the element if the text is empty."""
         shown = visible_lines(text)
         if shown != self.text:

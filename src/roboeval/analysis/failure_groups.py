@@ -98,7 +98,7 @@ def describe_groups(groups: Iterable[Sequence[Row]], results: Results) -> Iterat
             representative=key_of(row),
             program=program,
             reason=reason(row, results.suite, ablated=results.is_ablated),
-            fix=shortest_fix(program, right),
+            fix=smallest_difference(program, right),
         )
 
 
@@ -207,7 +207,7 @@ def _split(program: str) -> ProgramLines:
     return tuple(line.rstrip() for line in program[:MAX_COMPARED_CHARACTERS].strip("\n").splitlines())
 
 
-def shortest_fix(program: str, candidates: Mapping[ProgramLines, str]) -> Fix | None:
+def smallest_difference(program: str, candidates: Mapping[ProgramLines, str]) -> Fix | None:
     """Return the smallest difference to a passing program (a candidate), or None if there are none."""
     lines = _split(program)
     counts = Counter(lines)

@@ -78,16 +78,16 @@ class Estimate:
 
 @dataclass(frozen=True)
 class PromptScore:
-    """The numbers of judged (`n`) and passed (`c`) completions of a prompt. Prompts are numbered from 0."""
+    """The numbers of judged and of passed completions of a prompt. Prompts are numbered from 0."""
 
     task: str
     prompt: int
-    n: int
-    c: int
+    completions: int
+    passed: int
 
     def pass_at(self, k: int) -> float:
         """Return pass@k of the prompt. Raise ValueError if it has fewer than k completions."""
-        return pass_at_k(self.n, self.c, k)
+        return pass_at_k(self.completions, self.passed, k)
 
 
 @dataclass(frozen=True)
@@ -98,14 +98,14 @@ class TaskScore:
     prompts: tuple[PromptScore, ...]
 
     @property
-    def n(self) -> int:
+    def completions(self) -> int:
         """The number of judged completions."""
-        return sum(prompt.n for prompt in self.prompts)
+        return sum(prompt.completions for prompt in self.prompts)
 
     @property
-    def c(self) -> int:
+    def passed(self) -> int:
         """The number of completions that passed."""
-        return sum(prompt.c for prompt in self.prompts)
+        return sum(prompt.passed for prompt in self.prompts)
 
     def pass_at(self, k: int) -> Estimate:
         """Return the mean pass@k. Raise ValueError if a prompt has fewer than k completions."""

@@ -32,7 +32,7 @@ class TraceMatch:
     is_in_scope: bool = True  # whether it was judged in a world of the query
 
 
-def match_row(row: Mapping[str, Any], query: TraceQuery) -> TraceMatch:
+def search_row(row: Mapping[str, Any], query: TraceQuery) -> TraceMatch:
     """Search a completion's row. Return the worlds that match, and those whose trace was not stored."""
     formula = query.formula
     worlds, cut = [], []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from codebotler.cli.ending import obey
+from codebotler.cli.ending import run_command_line
 from codebotler.cli.options import command_line
 from codebotler.core.terminal import report_problems
 from roboeval.cli.mutate import mutate
@@ -43,7 +43,7 @@ app.command("import")(import_)
 def main() -> None:
     """Run the `roboeval` command with the arguments of this process."""
     with report_problems():
-        obey(app, "roboeval")
+        run_command_line(app, "roboeval")
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ Selection: TypeAlias = tuple[str, *tuple[int, ...]]
 """A part of a run: a task, a prompt such as `("LunchTime", 0)`, or the key of a completion."""
 
 
-def load(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
+def load_suite_option(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
     """Read a suite by name or folder, with a file of house rules and files of more skills, if given."""
     from codebotler.checking.house_rules.rooms import find_evasions
     from codebotler.core.skills.files import skills_from
@@ -78,7 +78,7 @@ def expect_same_suite(opened: Sequence[Results], suite: str) -> None:
     """Raise UserError if runs were judged by suites with different content."""
     digests = [one.manifest.get("digest") for one in opened]
     if len({*digests}) > 1:
-        now = opened[0].known_suite.digest
+        now = opened[0].required_suite.digest
         stale = next(one for one, digest in zip(opened, digests, strict=True) if digest != now)
         raise UserError(
             "was judged by another version of the suite than other runs; "
@@ -104,7 +104,8 @@ def open_run(
     from roboeval.evaluation.runs.results import read_results
 
     again = command("evaluate", run, suite=suite_name, ablated=ablated, rules=rules)
-    folder, key, suite = evaluation_of(run, load(suite_name, rules), ablated=ablated, again=again)
+    suite = load_suite_option(suite_name, rules)
+    folder, key, suite = evaluation_of(run, suite, ablated=ablated, again=again)
     results = read_results(
         folder,
         key,
@@ -125,17 +126,12 @@ def open_run(
     return results
 
 
-def open_current(
-    run: Path,
-    suite_name: str,
-    *,
-    ablated: bool,
-    rules: Path | None = None,
-    reuse_from: Results | None = None,
+def open_with_results(
+    run: Path, suite_name: str, *, ablated: bool, rules: Path | None = None, reuse_from: Results | None = None
 ) -> Results:
     """Read a run with `open_run`, and print what is not judged. Raise UserError if nothing is judged."""
     results = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from)
-    unjudged = find_gap(results, suite_name, rules)
+    unjudged = unjudged_sentence(results, suite_name, rules)
     if results.table.is_empty():
         raise UserError(unjudged or "the run contains no completions; `roboeval run` adds some", file=run)
     if unjudged:
@@ -143,7 +139,7 @@ def open_current(
     return results
 
 
-def find_gap(results: Results, suite_name: str, rules: Path | None) -> str | None:
+def unjudged_sentence(results: Results, suite_name: str, rules: Path | None) -> str | None:
     """Return a sentence on how many completions are judged and how to go on, or None if all are judged."""
     from roboeval.evaluation.runs.completions import how_many
 
@@ -156,7 +152,7 @@ def evaluate_again(results: Results, suite_name: str, rules: Path | None = None)
     """Return the command line of `roboeval evaluate` that continues an evaluation with its options."""
     from roboeval.evaluation.runs.folder import tasks_to_judge
 
-    words, suite, ablated = [], results.known_suite, results.is_ablated
+    words, suite, ablated = [], results.required_suite, results.is_ablated
     every = tasks_to_judge(suite, None, ablated=ablated)[0]
     if results.tasks is not None and results.tasks != every:
         words += ["--tasks", ",".join(sorted(results.tasks))]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.inputs import load
+from roboeval.cli.inputs import load_suite_option
 from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, WorldsOption, path_to
 from roboeval.cli.output import note, print_rich, show_progress
 
@@ -62,7 +62,7 @@ def mutate(
     from roboeval.mutation.report import write_scores
     from roboeval.mutation.trials import mutation_score
 
-    known = load(suite)
+    known = load_suite_option(suite)
     wanted = [known.task(name) for name in tasks or known.tasks]
     further = named_programs(also or [], known)
     score = partial(mutation_score, worlds=worlds, most=most, seed=seed, progress=show_progress)
@@ -86,7 +86,7 @@ def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Or
     for source in sources:
         for completion in open_source(source, suite).completions:
             name = f"{source}:{name_of(completion.key)}"
-            found[completion.task].append(Original(name, completion.program, claimed=False))
+            found[completion.task].append(Original(name, completion.program, declared_right=False))
     return found
 
 
@@ -101,6 +101,6 @@ def show_scores(scores: Sequence[MutationScore], suite: str, *, brief: bool) -> 
         for warning in score.warnings:
             note(f"warning: {warning}")
         for original, fault in score.wrong:
-            if original.claimed:
+            if original.declared_right:
                 where = f"{fault.world}: {fault.why}"
                 note(f"not mutated because the program is wrong: {score.task}, {original.name} ({where})")

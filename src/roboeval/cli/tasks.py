@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.inputs import command, load
+from roboeval.cli.inputs import command, load_suite_option
 from roboeval.cli.options import SuiteOption
 from roboeval.cli.output import fail, note, print_rich, print_text, show_progress
 
@@ -38,7 +38,7 @@ def tasks(
         return
     if accepted and not lint:
         fail("--accepted needs --lint; add --lint")
-    known = load(suite)
+    known = load_suite_option(suite)
     if lint:
         chosen = list(known.tasks.values()) if task is None else [known.task(task)]
         lint_tasks(known, chosen, accepted=accepted)

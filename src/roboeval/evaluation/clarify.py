@@ -119,7 +119,7 @@ def clarify(
 def _by_prompt(completions: Iterable[Completion], least: int) -> dict[tuple[str, int], list[Completion]]:
     found: dict[tuple[str, int], list[Completion]] = {}
     for one in completions:
-        if one.acted is not None:
+        if one.mission is not None:
             raise UserError("the completions are missions of an agent; choose a run with programs")
         found.setdefault((one.task, one.prompt), []).append(one)
     if not (enough := {key: some for key, some in sorted(found.items()) if len(some) >= least}):

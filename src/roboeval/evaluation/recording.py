@@ -44,9 +44,9 @@ class RecordingRobot(SimulatedRobot):
     Args:
         world: the world.
         suite: the suite with the settings, skills and house rules.
-        made: the calls that it repeats at the start. A call of `SLEEP` lets time pass.
+        earlier_calls: the calls that it repeats at the start. A call of `SLEEP` lets time pass.
         contracts: limits on its calls; a call outside of them ends the run.
-        fault: the index of the one skill call that fails, counted from 0 with those in `made`; None for none.
+        fault: the index of the one skill call that fails, counting the earlier calls; None for none.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class RecordingRobot(SimulatedRobot):
         world: World,
         suite: Suite,
         *,
-        made: Iterable[Call] = (),
+        earlier_calls: Iterable[Call] = (),
         contracts: Sequence[Contract] = (),
         fault: int | None = None,
     ) -> None:
@@ -64,7 +64,7 @@ class RecordingRobot(SimulatedRobot):
         self.try_at: int | None = None  # the index of the line `try:` of the last call, if that has failed
         self.is_outside = False  # whether the last call was outside of a contract, so that it was not made
         self._fault: int | None = None
-        for skill, arguments in made:
+        for skill, arguments in earlier_calls:
             with suppress(RobotError):
                 if skill == SLEEP:
                     self.sleep_until(float(arguments[0]))  # type: ignore[arg-type]  # a number of seconds

@@ -12,7 +12,7 @@ from typing import Literal
 from codebotler.checking.check import check_on
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.remaining import remaining_outcomes
-from codebotler.checking.repetition import hold_to_past
+from codebotler.checking.repetition import with_repetition_problems
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.skills.kinds import PICK, PLACE
 from codebotler.core.text.phrases import is_spoken
@@ -50,8 +50,8 @@ class Interruption:
 
     result: FaultResult  # which mission, and which fault
     scenario: Scenario = field(repr=False)  # its world, and what its prompt asks for
-    made: Sequence[Call] = field(repr=False)  # the calls before the fault
-    whole: Trace = field(repr=False)  # the trace without the fault
+    earlier_calls: Sequence[Call] = field(repr=False)  # before the fault
+    trace_without_fault: Trace = field(repr=False)
     past: MissionPast = field(repr=False)  # what the mission did, and why it ended
 
     @property
@@ -69,7 +69,7 @@ class Interruption:
 def rest_prompt(past: MissionPast, request: Prompt) -> Prompt:
     """Return the prompt for the rest of a mission, made from `request`, the prompt for the whole mission."""
     last_step = (past.done or [""])[-1]
-    return request.to_continue(past.program, past.steps, past.why, past.here(past.place), last_step)
+    return request.to_continue(past.program, past.steps, past.why, past.position_text(past.place), last_step)
 
 
 def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[Interruption | FaultResult]:
@@ -113,7 +113,7 @@ def check_rest(worker: Worker, suite: Suite, program: str, room_map: RoomMap, be
     """Check a program for the rest of a mission, which `begun` started. It must not repeat steps."""
     settings = CheckSettings(skills=suite.skills, house_rules=suite.house_rules)
     left = remaining_outcomes(begun, room_map, suite.skills, worker=worker)
-    return hold_to_past(check_on(worker, program, room_map, settings), begun, left)
+    return with_repetition_problems(check_on(worker, program, room_map, settings), begun, left)
 
 
 def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: str | None) -> FaultResult:
@@ -123,7 +123,8 @@ def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: s
     problems = check_rest(worker, suite, program, one.room_map, one.past.program).problems
     if problems:
         return replace(one.result, end="rejected", why=problems[0].sentence)
-    outcome = worker.run_alone(program, partial(RecordingRobot, one.scenario.world, suite, made=one.made))
+    robot = partial(RecordingRobot, one.scenario.world, suite, earlier_calls=one.earlier_calls)
+    outcome = worker.run_alone(program, robot)
     verdict = judge(outcome, one.scenario)
     faults = [requirement.text for requirement in verdict.failed]
     faults += [] if outcome.error is None else [f"{outcome.error.kind}: {outcome.error.message}"]
@@ -132,7 +133,7 @@ def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: s
         end="passed" if verdict.satisfied else "failed",
         why="" if verdict.satisfied else faults[0],
         steps=len(outcome.trace),
-        repeated=(_effects(outcome.trace) - _effects(one.whole)).total(),
+        repeated=(_effects(outcome.trace) - _effects(one.trace_without_fault)).total(),
     )
 
 

@@ -26,7 +26,7 @@ class Original:
 
     name: str
     program: str
-    claimed: bool = True  # whether the author declares it to be right
+    declared_right: bool = True  # whether the author declares it to be right
 
     @cached_property
     def tree(self) -> ProgramTree | None:

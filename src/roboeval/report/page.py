@@ -99,7 +99,7 @@ def _part(part: Part, drawings: DrawnFigures) -> str:
 
 def _card(card: Card) -> str:
     estimate = card.passed
-    low, high = (100 * end for end in (estimate.low, estimate.high))
+    low, high = (100 * share for share in (estimate.low, estimate.high))
     bar = f'<i style="width: {100 * estimate.mean:.1f}%"></i>'
     if estimate.is_known:
         bar += f'<u style="left: {low:.1f}%; width: {high - low:.1f}%"></u>'

@@ -39,7 +39,7 @@ class JudgedRun:
     @property
     def suite(self) -> Suite:
         """The suite that judged the run."""
-        return self.results.known_suite
+        return self.results.required_suite
 
     @property
     def folder(self) -> str:

@@ -53,35 +53,30 @@ def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
     return f"Robot programs by {title}", lead
 
 
-def sections(
-    runs: Sequence[JudgedRun],
-    *,
-    with_published: bool = False,
-    command: str = "",
-) -> list[Section]:
+def sections(runs: Sequence[JudgedRun], *, with_published: bool = False, command: str = "") -> list[Section]:
     """Return the non-empty sections of a report on runs of one suite. `command` is its command line."""
     found = [
-        glance(runs),
-        scores.results(runs),
-        scores.differences(runs),
-        failures.other_suite(runs),
+        glance_section(runs),
+        scores.results_section(runs),
+        scores.differences_section(runs),
+        failures.other_suite_section(runs),
         section("modes", modes.mode_sheet(runs), modes.ending_sheet(runs)),
-        failures.house(runs),
-        scores.thresholds(runs),
+        failures.house_rules_section(runs),
+        scores.thresholds_section(runs),
         failures.causes_section(runs, with_published=with_published),
         failures.failures_section(runs),
         section("abilities", breakdown.ability_sheet(runs), breakdown.report_back_sheet(runs)),
         section("phrasing", breakdown.spread_sheet(runs), breakdown.phrasing_sheet(runs)),
-        cost.rejection_sampling(runs),
-        question.question(runs),
+        cost.rejection_sampling_section(runs),
+        question.question_section(runs),
         section("cost", cost.cost_sheet(runs), cost.budget_sheet(runs)),
         section("prompts", scores.prompt_sheet(runs), published_sheet(runs)),
-        origin(runs, command),
+        origin_section(runs, command),
     ]
     return [one for one in found if one.parts]
 
 
-def glance(runs: Sequence[JudgedRun]) -> Section:
+def glance_section(runs: Sequence[JudgedRun]) -> Section:
     """Build the section with a card for each run and a comparison of the two best runs."""
     cards = [
         Card(
@@ -94,10 +89,10 @@ def glance(runs: Sequence[JudgedRun]) -> Section:
         )
         for run in runs
     ]
-    return section("glance", Cards(cards), Prose(scores.leader(runs)))
+    return section("glance", Cards(cards), Prose(scores.leader_sentences(runs)))
 
 
-def origin(runs: Sequence[JudgedRun], command: str) -> Section:
+def origin_section(runs: Sequence[JudgedRun], command: str) -> Section:
     """Build the section on the runs, the suite, and the command that reproduces the report."""
     return section("origin", origin_sheet(runs), Prose([*about_suite(runs), f"`{command}`"]))
 
@@ -174,6 +169,6 @@ def expect_no_others(out: Path) -> None:
         )
 
 
-def pieces(sections: Sequence[Section]) -> int:
+def count_parts(sections: Sequence[Section]) -> int:
     """Count the names that `write_report` yields, to show its progress."""
     return 1 + sum(isinstance(part, Sheet | ReportFigure) for section in sections for part in section.parts)

@@ -49,7 +49,7 @@ class _RunPage:
         self._kinds: dict[CompletionFilter, _Kind] = {}
         PlainText("h1", shortened(run.name, MAX_NAME))
         self._error = PlainText("p", "", "trouble").props("role=alert")
-        self._error.say("")
+        self._error.show_text("")
         self._head = ui.element("div").classes("run-head")
         with ui.element("div").classes("findings"):
             with ui.element("section").classes("pane").props("aria-labelledby=h-heat"):
@@ -71,13 +71,13 @@ class _RunPage:
         try:
             run = await asyncio.to_thread(self._store.open, self._run.name, self._evaluation)
         except MissingError:
-            self._error.say(RUN_DELETED)
+            self._error.show_text(RUN_DELETED)
             self.timer.deactivate()
             return
         except UserError as error:  # a file may be damaged, or may have changed while being read
-            self._error.say(str(error))
+            self._error.show_text(str(error))
             return
-        self._error.say("")
+        self._error.show_text("")
         if run.version != self._run.version:
             self._run = run
             self._changes += 1
@@ -106,8 +106,8 @@ class _RunPage:
         cells = TaskCells(run, chosen, self._evaluation)
         rows = [{"name": shortened(task, MAX_NAME), "cells": cells.row(task)} for task in cells.tasks]
         self._heat.show(groups=[{"name": "", "columns": cells.columns}], rows=rows)
-        self._title.say(f"Share that {verb_of(chosen)}")
-        self._which.say(_heading(chosen))
+        self._title.show_text(f"Share that {verb_of(chosen)}")
+        self._which.show_text(_heading(chosen))
         self._all.set_visibility(chosen != CompletionFilter())
         source = f"/api/runs/{quote(run.name, safe='')}/completions{chosen.query(run.results.key) or '?'}"
         query = chosen.query(self._evaluation)
@@ -148,8 +148,8 @@ class _Kind:
     def show(self, count: int, total: int, *, is_here: bool) -> None:
         self._button.props(f"aria-pressed={'true' if is_here else 'false'}")
         self._button.style(f"--share: {count / total if total else 0:.3f}")
-        self._count.say(f"{count:,}")
-        self._share.say(f"{percent(count / total)}%" if total else MISSING)
+        self._count.show_text(f"{count:,}")
+        self._share.show_text(f"{percent(count / total)}%" if total else MISSING)
 
 
 def _draw_head(run: Snapshot, *, has_report: bool) -> None:

@@ -60,9 +60,9 @@ class _Table:
         try:
             data = await asyncio.to_thread(self._runs.data, MAX_READ_SECONDS)
         except UserError as error:
-            self._error.say(str(error))
+            self._error.show_text(str(error))
         else:
-            self._error.say("")
+            self._error.show_text("")
             self._show(data)
 
     def _show(self, data: list[dict[str, Any]]) -> None:
@@ -108,16 +108,16 @@ class _RunRow:
 
     def show(self, run: Mapping[str, Any]) -> None:
         by_hand = ", programs written by hand" if run.get("by_hand") else ""
-        self._models.say(shortened(", ".join(run.get("models", ())), 160) + by_hand)
-        self._settings.say(shortened(run.get("settings") or "", 160))
-        self._tasks.say(tasks_text(run))
-        self._date.say(date_text(run))
-        self._notes.say(" ".join(run["notes"][:1]))
-        self._suite.say(shortened(str(run.get("evaluation") or run.get("suite") or MISSING), MAX_NAME))
+        self._models.show_text(shortened(", ".join(run.get("models", ())), 160) + by_hand)
+        self._settings.show_text(shortened(run.get("settings") or "", 160))
+        self._tasks.show_text(tasks_text(run))
+        self._date.show_text(date_text(run))
+        self._notes.show_text(" ".join(run["notes"][:1]))
+        self._suite.show_text(shortened(str(run.get("evaluation") or run.get("suite") or MISSING), MAX_NAME))
         show_state(run, self._state, self._bar)
-        self._count.say(count_text(run))
+        self._count.show_text(count_text(run))
         mean = run.get("pass@1")
-        self._score.say(MISSING if mean is None else f"{mean['mean']:.3f}")
-        self._interval.say("" if mean is None else Estimate(**mean).ends(".2f"))
+        self._score.show_text(MISSING if mean is None else f"{mean['mean']:.3f}")
+        self._interval.show_text("" if mean is None else Estimate(**mean).ends(".2f"))
         self._meter.set_visibility(mean is not None)
         self._meter.style(f"--share: {0 if mean is None else mean['mean']:.3f}")

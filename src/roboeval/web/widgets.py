@@ -90,7 +90,7 @@ class ProgramView(Element, component="static/code.js"):
 def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = None) -> None:
     """Show a run's state on a label and, if there is a bar, its progress. `data` is the run's `run_data`."""
     state = str(data["state"])
-    label.say(state)
+    label.show_text(state)
     label.classes(replace=f"state state-{state.replace(' ', '-')}")
     if bar is not None:
         names = ("completions", "requested") if state == RunState.GENERATING else ("judged", "to_judge")

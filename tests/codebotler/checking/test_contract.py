@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.checking.check import check, hold_within
+from codebotler.checking.check import check, with_contract_problems
 from codebotler.checking.contracts.file import contract_from, contract_yaml, read_contract
 from codebotler.checking.contracts.text import contract_rows, contract_sentence
 from codebotler.checking.problems import CheckResult
@@ -190,10 +190,10 @@ def test_more_calls_than_the_contract_allows_are_refused(contracts: Contracts) -
 
 def test_beyond_returns_only_what_the_other_contract_lacks(contracts: Contracts) -> None:
     before, after = contracts(BRING), contracts(BRING.replace('place("coffee")', 'say("Here you are")'))
-    assert not before.beyond(before).skills
-    assert set(after.beyond(before).skills) == {"say"}
-    assert set(before.beyond(after).skills) == {"place"}
-    wider = contracts(BRING.replace('["yes", "no"]', '["yes", "no", "later"]')).beyond(before)
+    assert not before.excess_over(before).skills
+    assert set(after.excess_over(before).skills) == {"say"}
+    assert set(before.excess_over(after).skills) == {"place"}
+    wider = contracts(BRING.replace('["yes", "no"]', '["yes", "no", "later"]')).excess_over(before)
     assert texts_of(wider, "ask") == {"person": ["Ann"], "question": ["Coffee?"], "options": ["later"]}
 
 
@@ -229,8 +229,8 @@ def test_invalid_file_is_refused_with_its_line(tmp_path: Path, text: str, line: 
 
 def test_a_program_beyond_a_contract_has_a_problem(contracts: Contracts) -> None:
     found = contracts.check(BRING)
-    assert not hold_within(found, contracts(BRING), SKILLS).problems
-    problems = hold_within(found, contracts(PRINTERS), SKILLS).problems
+    assert not with_contract_problems(found, contracts(BRING), SKILLS).problems
+    problems = with_contract_problems(found, contracts(PRINTERS), SKILLS).problems
     assert {problem.kind for problem in problems} == {"OutsideContract"}
 
 
@@ -275,7 +275,7 @@ def test_problem_names_the_number_of_calls_beyond_the_contract(contracts: Contra
     found = contracts.check(BRING)
     bound = contracts(BRING).skills["go_to"]
     tighter = Contract({**contracts(BRING).skills, "go_to": replace(bound, at_most=1)})
-    (problem,) = hold_within(found, tighter, SKILLS).problems
+    (problem,) = with_contract_problems(found, tighter, SKILLS).problems
     assert "at most 3 times" in problem.message
 
 
@@ -315,7 +315,7 @@ def test_empty_person_is_shown_as_anybody() -> None:
 def test_contract_also_limits_skills_without_events(contracts: Contracts) -> None:
     silent = Skill("take_photo", (), ValueType(None), "Take a photo.", is_idle=True)
     found = replace(contracts.check(BRING), contract=Contract({"take_photo": SkillBound()}))
-    assert hold_within(found, Contract({}), SKILLS.with_skill(silent)).problems
+    assert with_contract_problems(found, Contract({}), SKILLS.with_skill(silent)).problems
 
 
 def test_computed_text_is_unbounded_if_a_question_is_asked_twice(contracts: Contracts) -> None:

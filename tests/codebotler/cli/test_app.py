@@ -10,7 +10,7 @@ import pytest
 
 import command_line
 from codebotler.cli.app import app
-from codebotler.cli.ending import obey
+from codebotler.cli.ending import run_command_line
 from command_line import Ended, Refusal, command
 
 GOOD = """def task_program():
@@ -220,7 +220,7 @@ def test_error_on_windows_names_wsl(
 ) -> None:
     monkeypatch.setattr(sys, "platform", "win32")
     with pytest.raises(SystemExit) as end:
-        obey(app, "codebotler")
+        run_command_line(app, "codebotler")
     assert end.value.code == 1
     assert re.fullmatch(r"codebotler: .*\bWSL\n", capsys.readouterr().err)
 

@@ -22,7 +22,7 @@ from rich.text import Text
 import codebotler
 import roboeval
 from codebotler.cli.app import app
-from codebotler.cli.ending import obey
+from codebotler.cli.ending import run_command_line
 from codebotler.core import terminal
 from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError
@@ -59,7 +59,7 @@ def raise_in_command(error: Exception) -> None:
         raise error
 
     with pytest.raises(SystemExit):
-        obey(commands, "codebotler")
+        run_command_line(commands, "codebotler")
 
 
 def print_while_busy(text: str) -> None:
@@ -86,7 +86,7 @@ WAYS_TO_PRINT: dict[str, Callable[[str], object]] = {
     "a line": lambda text: terminal.console(highlight=False).print(text, markup=False),
     "what goes on": print_while_busy,
     "a refusal": lambda text: raise_in_command(UserError(text)),
-    "a model's error": lambda text: raise_in_command(ModelError(text, may_pass=False)),
+    "a model's error": lambda text: raise_in_command(ModelError(text, is_temporary=False)),
     "a file's name": lambda text: raise_in_command(FileNotFoundError(2, "No such file", text)),
     "a log": lambda text: logging.getLogger("anybody").warning(text),
     "a warning": lambda text: warnings.warn(text, stacklevel=1),
@@ -128,7 +128,7 @@ def test_room_name_is_printed_without_control_characters(
     program.write_text('def task_program():\n    go_to("kitchen")\n')
     monkeypatch.setattr(sys, "argv", ["codebotler", "check", str(program), "--world", str(world)])
     with pytest.raises(SystemExit) as end:
-        obey(app, "codebotler")
+        run_command_line(app, "codebotler")
     assert end.value.code == 2
     assert "lob\\x1b]0;owned\\x07by" in capsys.readouterr().err
 

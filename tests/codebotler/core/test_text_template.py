@@ -103,4 +103,4 @@ def test_beyond_returns_the_templates_that_none_covers() -> None:
     for number in range(1 << 6):
         allowed = [one for bit, one in enumerate(texts[:6]) if number >> bit & 1]
         uncovered = [one for one in texts if not any(each.covers(one) for each in allowed)]
-        assert TextTemplate.beyond(texts, allowed) == uncovered
+        assert TextTemplate.excess(texts, allowed) == uncovered

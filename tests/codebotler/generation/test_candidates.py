@@ -29,7 +29,7 @@ def test_requests_run_at_the_same_time_and_the_model_is_closed() -> None:
 
 
 def test_the_model_is_closed_after_an_error() -> None:
-    model = Scripted(fails=lambda _: ModelError("no quota", may_pass=False))
+    model = Scripted(fails=lambda _: ModelError("no quota", is_temporary=False))
     with pytest.raises(ModelError, match="no quota"):
         asyncio.run(gather_candidates(model, PROMPT, 2))
     assert model.closed

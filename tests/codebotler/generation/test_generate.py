@@ -26,7 +26,7 @@ class Scripted:
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
         self.asked.append((prompt, number))
         if number >= len(self.lines):
-            raise ModelError("the script is over", may_pass=False)
+            raise ModelError("the script is over", is_temporary=False)
         on_text(self.lines[number])
         return Reply(self.lines[number], self.lines[number], Usage(3, 4), 0.25, "stop")
 

@@ -59,8 +59,8 @@ def run(
     folder: Path, robot: Robot, program: str, contract: Contract = ALLOWED, *, place: str = "hall"
 ) -> tuple[Mission, list[LogLine]]:
     mission = Mission(folder, robot.name)
-    mission.draft(program)
-    mission.check([])
+    mission.set_program(program)
+    mission.record_check([])
     mission.approve()
     with Reservation(robot, folder) as reserved, mission:
         mission.run(reserved, place, room_map=ROOMS, contracts=[contract])
@@ -122,8 +122,8 @@ def task_program():
 def test_every_contract_bounds_the_mission(tmp_path: Path) -> None:
     robot = FakeRobot()
     mission = Mission(tmp_path, robot.name)
-    mission.draft("def task_program():\n    go_to('kitchen')\n    go_to('hall')\n")
-    mission.check([])
+    mission.set_program("def task_program():\n    go_to('kitchen')\n    go_to('hall')\n")
+    mission.record_check([])
     mission.approve()
     with Reservation(robot, tmp_path) as reserved, mission:
         only_kitchen = Contract({"go_to": bound(location=["kitchen"])})
@@ -206,7 +206,7 @@ def test_a_session_compares_an_edited_program_with_the_last_one(tmp_path: Path) 
     session.stop("the test")
     assert view.contract is not None
     assert view.earlier is not None
-    assert set(view.contract.beyond(view.earlier).skills) == {"say"}
+    assert set(view.contract.excess_over(view.earlier).skills) == {"say"}
 
 
 def test_a_session_refuses_a_program_beyond_the_contract_of_its_start(tmp_path: Path) -> None:

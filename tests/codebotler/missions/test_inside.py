@@ -57,8 +57,8 @@ NEVER = rule('not tr.Exists(inside("printer room 2"))', name="never")
 
 def run(folder: Path, robot: Robot, program: str, *rules: Rule) -> tuple[Mission, list[LogLine]]:
     mission = Mission(folder, robot.name)
-    mission.draft(program)
-    mission.check([])
+    mission.set_program(program)
+    mission.record_check([])
     mission.approve()
     with Reservation(robot, folder) as reserved, mission:
         room_map, place = ask_rooms(robot, mission.note, WORLD)
@@ -414,9 +414,9 @@ def test_other_rules_have_no_keepout_mask(formula: str) -> None:
 
 def test_violation_names_the_room_and_the_carried_thing() -> None:
     guard = RuleGuard([NEVER], MAP)
-    guard.moved((2, 3), (4.5, 3), "")
+    guard.record_drive((2, 3), (4.5, 3), "")
     with pytest.raises(RuleViolationError) as caught:
-        guard.moved((4.5, 3), (7, 3), "mug")
+        guard.record_drive((4.5, 3), (7, 3), "mug")
     assert caught.value.event == Event("inside", "printer room 2")
     assert caught.value.event is not None
     assert caught.value.event.holding == "mug"

@@ -54,9 +54,9 @@ def mission(tmp_path_factory: pytest.TempPathFactory) -> tuple[MissionSummary, l
     home = tmp_path_factory.mktemp("home")
     with Reservation(Simulated(WORLD, speed=None), home) as reserved:
         with Mission(home, "simulated", "bring tea") as mission:
-            mission.show_map(WORLD)
-            mission.draft(PROGRAM, "recorded:careful")
-            mission.check([])
+            mission.log_map(WORLD)
+            mission.set_program(PROGRAM, "recorded:careful")
+            mission.record_check([])
             mission.note("a word")
             mission.approve()
             mission.run(reserved)

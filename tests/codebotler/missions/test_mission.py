@@ -63,8 +63,8 @@ def prepare(
 ) -> Mission:
     """Make a mission and approve it."""
     mission = Mission(home, "answering", on_event=on_event)
-    mission.draft(program)
-    mission.check([])
+    mission.set_program(program)
+    mission.record_check([])
     mission.approve()
     return mission
 
@@ -114,8 +114,8 @@ def test_each_event_is_on_the_disk_before_a_listener_hears_it(home: Path) -> Non
 
 
 STEP: dict[str, Callable[[Mission, Reservation], object]] = {
-    "draft": lambda mission, _: mission.draft(HELLO),
-    "check": lambda mission, _: mission.check([]),
+    "draft": lambda mission, _: mission.set_program(HELLO),
+    "check": lambda mission, _: mission.record_check([]),
     "approve": lambda mission, _: mission.approve(),
     "fail": lambda mission, _: mission.fail("no"),
     "run": lambda mission, reserved: mission.run(reserved),
@@ -163,8 +163,8 @@ def test_running_mission_can_only_be_stopped(home: Path) -> None:
 
 def test_program_with_problems_needs_explicit_approval(home: Path) -> None:
     with Mission(home, "answering") as mission:
-        mission.draft(HELLO)
-        mission.check(["line 2: there is nobody"])
+        mission.set_program(HELLO)
+        mission.record_check(["line 2: there is nobody"])
         with pytest.raises(MissionError, match="has problems"):
             mission.approve()
         mission.approve(despite_problems=True)
@@ -185,7 +185,7 @@ def test_leaving_the_context_ends_the_mission(
 ) -> None:
     mission = Mission(home, "answering")
     with suppress(KeyboardInterrupt, ValueError), mission:
-        mission.draft(HELLO)
+        mission.set_program(HELLO)
         if error:
             raise error
     summary = MissionSummary.read(mission.folder)
@@ -636,7 +636,7 @@ def test_summary_is_written_whole_or_not_at_all(home: Path) -> None:
         before = (mission.folder / SUMMARY_FILE).read_text()
         (mission.folder / f"{SUMMARY_FILE}.new").mkdir()
         with pytest.raises(IsADirectoryError):
-            mission.draft(HELLO)
+            mission.set_program(HELLO)
         assert (mission.folder / SUMMARY_FILE).read_text() == before
         (mission.folder / f"{SUMMARY_FILE}.new").rmdir()
 

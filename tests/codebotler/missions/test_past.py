@@ -11,7 +11,7 @@ import pytest
 from codebotler.checking.check import check
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.remaining import remaining_outcomes
-from codebotler.checking.repetition import has_same_effect, hold_to_past
+from codebotler.checking.repetition import has_same_effect, with_repetition_problems
 from codebotler.core.errors import UserError
 from codebotler.core.skills.files import skills_from
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
@@ -81,7 +81,7 @@ def test_a_step_without_a_result_is_unsure_until_a_person_answers(
     past = read_past(folder, SKILLS)
     assert past.unsure is not None
     assert (past.unsure.kind, past.unsure.place) == (skill, past.place)
-    assert past.question
+    assert past.unsure_step_text
     assert past.resolve(happened=True).trace == (*past.trace, past.unsure)
     assert past.resolve(happened=True).held == held
     assert past.resolve(happened=True).testimony != past.resolve(happened=False).testimony != ""
@@ -108,8 +108,8 @@ def test_a_failed_step_was_not_done(tmp_path: Path) -> None:
 
 def test_a_mission_that_is_done_has_no_rest(tmp_path: Path) -> None:
     mission = Mission(tmp_path, "simulated")
-    mission.draft('def task_program():\n    say("a")\n')
-    mission.check([])
+    mission.set_program('def task_program():\n    say("a")\n')
+    mission.record_check([])
     mission.approve()
     robot = Simulated(WORLD, speed=None)
     with Reservation(robot, tmp_path) as reserved, mission:
@@ -152,8 +152,8 @@ def test_a_persons_testimony_is_kept_through_all_continuations(tmp_path: Path) -
     past = read_past(folder, SKILLS).resolve(happened=True)
     with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
         mission.continue_from(past)
-        mission.draft("def task_program():\n    go_to('nowhere')\n")
-        mission.check([])
+        mission.set_program("def task_program():\n    go_to('nowhere')\n")
+        mission.record_check([])
         mission.approve()
         with Reservation(Simulated(WORLD, speed=None), tmp_path) as reserved:
             mission.run(reserved, "hall")
@@ -183,8 +183,8 @@ def test_the_rest_begins_after_the_steps_of_earlier_missions(tmp_path: Path) -> 
     past = read_past(fail(tmp_path, BRING), SKILLS)
     with Mission(tmp_path, "simulated") as mission:
         mission.continue_from(past)
-        mission.draft("def task_program():\n    say('a')\n    go_to('nowhere')\n")
-        mission.check([])
+        mission.set_program("def task_program():\n    say('a')\n    go_to('nowhere')\n")
+        mission.record_check([])
         mission.approve()
         with Reservation(Simulated(WORLD, speed=None), tmp_path) as reserved:
             mission.run(reserved, past.place)
@@ -215,7 +215,7 @@ def check_rest(*lines: str, past: tuple[Event, ...], begun: str = BRING) -> set[
     program = "def task_program():\n    " + "\n    ".join(lines) + "\n"
     room_map = RoomMap(ROOMS.rooms, "lab", plain=True, past=past)
     found = check(program, room_map=room_map, pool=shared_pool())
-    return {problem.kind for problem in hold_to_past(found, begun).problems}
+    return {problem.kind for problem in with_repetition_problems(found, begun).problems}
 
 
 SAID = Event(SAY, "There is no mug in room 3.", place="lab")
@@ -293,7 +293,7 @@ def follow(begun: str, rest: str, *past: Event, first: int = 0) -> set[str]:
     room_map = replace(ROOMS, start="lab", past=past)
     found = check(rest, room_map=room_map, pool=shared_pool())
     left = remaining_outcomes(begun, room_map, SKILLS, first=first)
-    return {problem.kind for problem in hold_to_past(found, begun, left).problems}
+    return {problem.kind for problem in with_repetition_problems(found, begun, left).problems}
 
 
 def poll(times: int, question: str = "Is it hot?") -> str:
@@ -522,8 +522,8 @@ def test_a_mission_is_continued_only_once(tmp_path: Path) -> None:
     mission = Mission(tmp_path, "simulated", "Bring Anne the mug.")
     mission.continue_from(past)
     assert read_past(folder, SKILLS).trace == past.trace, "the continuation has not run yet"
-    mission.draft('def task_program():\n    go_to("nowhere")\n')
-    mission.check([])
+    mission.set_program('def task_program():\n    go_to("nowhere")\n')
+    mission.record_check([])
     mission.approve()
     with Reservation(Simulated(WORLD, speed=None), tmp_path) as reserved, mission:
         mission.run(reserved, "lab")
@@ -533,8 +533,8 @@ def test_a_mission_is_continued_only_once(tmp_path: Path) -> None:
     assert (tuple(again), failed_drive.failed) == (past.trace, "GoToInvalidLocation")
     with Mission(tmp_path, "simulated") as last:
         last.continue_from(read_past(mission.folder, SKILLS))
-        last.draft('def task_program():\n    say("done")\n')
-        last.check([])
+        last.set_program('def task_program():\n    say("done")\n')
+        last.record_check([])
         last.approve()
         with Reservation(Simulated(WORLD, speed=None), tmp_path) as reserved:
             last.run(reserved, "lab")
@@ -575,8 +575,8 @@ def test_own_skills_are_not_repeated_either(tmp_path: Path) -> None:
     program = 'def task_program():\n    ring_bell()\n    dispense("aspirin", "Anne")\n    go_to("nowhere")\n'
     robot = Simulated(WORLD, speed=None, skills=table)
     mission = Mission(tmp_path, "simulated", "Ring.")
-    mission.draft(program)
-    mission.check([])
+    mission.set_program(program)
+    mission.record_check([])
     mission.approve()
     with Reservation(robot, tmp_path) as reserved, mission:
         mission.run(reserved, "hall")
@@ -589,8 +589,8 @@ def test_own_skills_are_not_repeated_either(tmp_path: Path) -> None:
 
 def test_a_mission_that_never_ran_has_no_rest(tmp_path: Path) -> None:
     with Mission(tmp_path, "simulated", "Bring Anne the mug.") as mission:
-        mission.draft(BRING, "somebody")
-        mission.check([])
+        mission.set_program(BRING, "somebody")
+        mission.record_check([])
         mission.stop("a person")
     with pytest.raises(UserError):
         read_past(mission.folder, SKILLS)

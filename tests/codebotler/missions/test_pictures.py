@@ -43,8 +43,8 @@ class CameraRobot(FakeRobot):
 
 def mission_with(home: Path, *pictures: bytes) -> tuple[Mission, list[LogLine]]:
     with Reservation(CameraRobot(*pictures), home) as reserved, Mission(home, "showing") as mission:
-        mission.draft(PROGRAM)
-        mission.check([])
+        mission.set_program(PROGRAM)
+        mission.record_check([])
         mission.approve()
         mission.run(reserved)
     return mission, [line for line in read_events(mission.folder) if line["event"] == "picture"]

@@ -62,8 +62,8 @@ def run(
     place: str = "hall",
 ) -> tuple[Mission, list[LogLine]]:
     mission = Mission(folder, robot.name)
-    mission.draft(program)
-    mission.check([])
+    mission.set_program(program)
+    mission.record_check([])
     mission.approve()
     with Reservation(robot, folder) as reserved, mission:
         mission.run(reserved, place, rules=rules, room_map=rooms)
@@ -95,8 +95,8 @@ def test_the_robot_is_stopped_before_anything_is_logged(tmp_path: Path) -> None:
 
     robot = Noting()
     mission = Mission(tmp_path, robot.name, on_event=lambda line: seen.append(line["event"]))
-    mission.draft(STUBBORN)
-    mission.check([])
+    mission.set_program(STUBBORN)
+    mission.record_check([])
     mission.approve()
     with Reservation(robot, tmp_path) as reserved, mission:
         mission.run(reserved, rules=[VAULT])
@@ -291,8 +291,8 @@ def test_rule_of_the_end_is_not_kept_if_the_room_is_unknown(tmp_path: Path) -> N
 def test_robot_that_lists_no_rooms_is_judged_by_the_words_of_drives(tmp_path: Path) -> None:
     for room, state in (("lab 2", MissionState.STOPPED), ("lab", MissionState.DONE)):
         mission = Mission(tmp_path / room, "robot")
-        mission.draft(f"def task_program():\n    go_to('{room}')\n    say('hello')\n")
-        mission.check([])
+        mission.set_program(f"def task_program():\n    go_to('{room}')\n    say('hello')\n")
+        mission.record_check([])
         mission.approve()
         robot = robot_with()
         with Reservation(robot, tmp_path / room) as reserved, mission:
@@ -585,7 +585,7 @@ def test_a_rule_that_was_switched_off_is_in_force_for_another_program(tmp_path: 
 
 def test_a_rule_stays_switched_off_if_no_other_program_comes(tmp_path: Path) -> None:
     def refuses(_name: str) -> Model:
-        raise ModelError("the model is not there", may_pass=False)
+        raise ModelError("the model is not there", is_temporary=False)
 
     order = MissionOrder("Go to the vault.", "refuses", STUBBORN)
     session = MissionSession(robot_in("hall", "vault"), tmp_path, order, open_model=refuses, rules=(VAULT,))

@@ -251,7 +251,7 @@ def test_requests_that_wait_together_are_one_batch_and_fewer_where_memory_is_sma
     assert [reply.text for reply in apart] == [reply.text for reply in together]
     with pytest.raises(ModelError, match="not enough memory") as caught:
         run(ask(0))
-    assert not caught.value.may_pass
+    assert not caught.value.is_temporary
 
 
 def test_error_of_the_model_reaches_the_caller(babbler: str) -> None:

@@ -132,7 +132,7 @@ def test_error_with_status_200_is_raised_in_the_servers_words(
     server.sends = lambda _request: (200, dict(headers), body)
     with pytest.raises(ModelError, match="The model is not loaded") as caught:
         ask(name, server)
-    assert not caught.value.may_pass
+    assert not caught.value.is_temporary
 
 
 @both
@@ -150,7 +150,7 @@ def test_error_names_the_address_of_a_redirect(name: str, server: Server) -> Non
     server.sends = lambda _request: (308, {"Location": address}, b"")
     with pytest.raises(ModelError, match=r"redirects to https://new\.example/v1/completions;") as caught:
         ask(name, server)
-    assert not caught.value.may_pass
+    assert not caught.value.is_temporary
     assert len(server.requests) == 1
 
 
@@ -391,7 +391,7 @@ def test_aborted_reply_is_an_error_that_may_pass(name: str, server: Server) -> N
     stream(server, whole(name), chunk(name, "", "abort"), DONE)
     with pytest.raises(ModelError, match="cut off") as caught:
         ask(name, server)
-    assert caught.value.may_pass
+    assert caught.value.is_temporary
 
 
 @pytest.mark.parametrize(

@@ -136,7 +136,7 @@ def test_retries_are_limited(server: Server) -> None:
     with pytest.raises(ModelError) as caught:
         use(server, ask_once, retries=2)
     assert caught.value.sentence.endswith("(tried 3 times)")
-    assert caught.value.may_pass
+    assert caught.value.is_temporary
     assert len(server.requests) == 3
 
 

@@ -144,7 +144,7 @@ def test_error_for_an_unknown_instruction_names_the_closest() -> None:
     assert '"Fetch me a coffee from the kitchen"' in sentence
     assert '"Go to the lobby and ask the visitor there whether they want water' in sentence
     assert len(caught.value.closest) == 3
-    assert not caught.value.may_pass
+    assert not caught.value.is_temporary
     assert pickle.loads(pickle.dumps(caught.value)).closest == caught.value.closest
     assert "\n" not in sentence
 

@@ -148,7 +148,7 @@ def test_failure_is_one_sentence_and_says_whether_it_may_pass(
     assert error.sentence.startswith(f"{name}: ")
     assert (PASSING | LASTING)[fault] in error.sentence
     assert "\n" not in error.sentence
-    assert error.may_pass == (fault in PASSING)
+    assert error.is_temporary == (fault in PASSING)
     assert error.retry_after is None
     assert len(server.requests) == 1  # The client itself does not retry.
 
@@ -163,7 +163,7 @@ def test_retry_after_is_read(name: str, server: Server, said: str, seconds: floa
     server.retry_after = said
     with pytest.raises(ModelError) as caught:
         ask(name, server)
-    assert caught.value.may_pass
+    assert caught.value.is_temporary
     assert caught.value.retry_after == seconds
 
 
@@ -174,7 +174,7 @@ def test_slow_reply_times_out(name: str, server: Server, fault: Fault) -> None:
     with pytest.raises(ModelError) as caught:
         ask(name, server, timeout=0.3)
     assert re.match(rf"{name}: .* 0\.3 s", caught.value.sentence)
-    assert caught.value.may_pass
+    assert caught.value.is_temporary
 
 
 @both
@@ -191,7 +191,7 @@ def test_endless_reply_times_out_though_its_pieces_arrive_in_time(name: str, ser
     with pytest.raises(ModelError) as caught:
         asyncio.run(request())
     assert re.match(rf"{name}: .* 1 s", caught.value.sentence)
-    assert caught.value.may_pass
+    assert caught.value.is_temporary
     assert len(heard) > 2
 
 
@@ -235,7 +235,7 @@ def test_unreachable_server_raises_one_sentence(name: str, server: Server) -> No
         sentence = rf"{server.url} \(.*(attempts failed|refused).*\)"
         with pytest.raises(ModelError, match=sentence) as caught:
             ask(name, server)
-    assert caught.value.may_pass
+    assert caught.value.is_temporary
 
 
 @both
@@ -271,7 +271,7 @@ def test_oversized_reply_is_not_read(
         ModelError, match="200,000 bytes" if fault is Fault.ENDLESS else "compressed"
     ) as caught:
         ask(name, server, max_tokens=10)
-    assert not caught.value.may_pass
+    assert not caught.value.is_temporary
     assert caught.value.sentence.startswith(name.partition(":")[0])
     assert len(server.requests) == 1
     assert server.requests[0].headers["accept-encoding"] == "identity"

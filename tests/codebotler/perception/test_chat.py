@@ -15,7 +15,14 @@ from PIL import Image
 
 from codebotler.core.errors import UserError
 from codebotler.models import rate_limit
-from codebotler.perception import Detector, PerceptionError, Sighting, image_of, jpeg_of, open_detector
+from codebotler.perception import (
+    Detector,
+    PerceptionError,
+    Sighting,
+    decode_image,
+    encode_jpeg,
+    open_detector,
+)
 from codebotler.perception.chat import (
     DETECTOR_PROMPT,
     FENCED_JSON,
@@ -71,15 +78,15 @@ def test_picture_and_name_arrive_and_the_answer_comes_back(server: Server, detec
     text, picture = read_request(first)
     assert json.loads(text) == "red mug"
     assert json.loads(read_request(second)[0]) == "mug"
-    assert picture == jpeg_of(PICTURE)
-    assert image_of(picture).size == (64, 40)
+    assert picture == encode_jpeg(PICTURE)
+    assert decode_image(picture).size == (64, 40)
     assert first.body["messages"][0] == {"role": "system", "content": DETECTOR_PROMPT}
     assert (first.body["model"], first.body["temperature"]) == ("eyes", 0.0)
 
 
 def test_large_picture_arrives_small(server: Server, detector: Detector) -> None:
     detector.look(Image.new("RGBA", (4_000, 3_000)), "mug")
-    assert image_of(read_request(server.requests[0])[1]).size == (1024, 768)
+    assert decode_image(read_request(server.requests[0])[1]).size == (1024, 768)
 
 
 def test_label_with_an_instruction_arrives_as_a_quoted_string(server: Server, detector: Detector) -> None:

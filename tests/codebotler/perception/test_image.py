@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from codebotler.core.errors import UserError
-from codebotler.perception import Sighting, boxed, image_from_ros, image_of, jpeg_of, read_image
+from codebotler.perception import Sighting, decode_image, encode_jpeg, image_from_ros, read_image, with_box
 from codebotler.perception.image import MAX_IMAGE_BYTES
 
 RED, BLUE = (255, 0, 0), (0, 0, 255)
@@ -58,32 +58,32 @@ def test_files_become_pictures(kind: str, tmp_path: Path) -> None:
 def test_picture_of_a_rotated_camera_is_upright() -> None:
     exif = Image.Exif()
     exif[0x0112] = 6  # This value means a quarter turn.
-    image = image_of(encode(make_halves(), "JPEG", exif=exif))
+    image = decode_image(encode(make_halves(), "JPEG", exif=exif))
     assert image.size == (20, 40)
     assert is_near(image, (10, 5), RED)
     assert is_near(image, (10, 35), BLUE)
-    assert not Image.open(io.BytesIO(jpeg_of(image))).getexif()
+    assert not Image.open(io.BytesIO(encode_jpeg(image))).getexif()
 
 
 def test_transparent_pixels_become_white() -> None:
-    image = image_of(encode(make_halves("RGBA", (255, 0, 0, 255), (0, 0, 0, 0))))
+    image = decode_image(encode(make_halves("RGBA", (255, 0, 0, 255), (0, 0, 0, 0))))
     assert (image.mode, image.getpixel((5, 5)), image.getpixel((35, 5))) == ("RGB", RED, (255, 255, 255))
-    grey = image_of(encode(make_halves("LA", (0, 255), (0, 0))))
+    grey = decode_image(encode(make_halves("LA", (0, 255), (0, 0))))
     assert (grey.getpixel((5, 5)), grey.getpixel((35, 5))) == ((0, 0, 0), (255, 255, 255))
 
 
 def test_sixteen_bits_of_grey_become_eight() -> None:
     row = struct.pack("<40H", *[2_000] * 20, *[4_000] * 20)
-    image = image_of(encode(Image.frombytes("I;16", (40, 20), row * 20)))
+    image = decode_image(encode(Image.frombytes("I;16", (40, 20), row * 20)))
     assert (image.mode, image.getpixel((5, 5)), image.getpixel((35, 5))) == ("RGB", (128,) * 3, (255,) * 3)
-    dark = image_of(encode(Image.new("I;16", (40, 20), 0)))
+    dark = decode_image(encode(Image.new("I;16", (40, 20), 0)))
     assert dark.getpixel((5, 5)) == (0, 0, 0)
 
 
 @pytest.mark.parametrize("mode", ["1", "L", "P", "CMYK"])
 def test_other_modes_become_colour(mode: str) -> None:
     kind = "JPEG" if mode == "CMYK" else "PNG"
-    assert image_of(encode(Image.new(mode, (40, 20)), kind)).mode == "RGB"
+    assert decode_image(encode(Image.new(mode, (40, 20)), kind)).mode == "RGB"
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_other_modes_become_colour(mode: str) -> None:
 )
 def test_bad_picture_raises_one_sentence(data: bytes, sentence: str) -> None:
     with pytest.raises(UserError) as error:
-        image_of(data)
+        decode_image(data)
     assert sentence in str(error.value)
 
 
@@ -111,7 +111,7 @@ def test_every_truncated_picture_is_refused_or_read() -> None:
     whole = encode(make_halves(), "PNG")
     for end in range(0, len(whole), 3):
         try:
-            image_of(whole[:end])
+            decode_image(whole[:end])
         except UserError:
             continue
         assert end > len(whole) - 20  # Only the end of the file may be missing.
@@ -183,14 +183,14 @@ def test_bad_message_raises_one_sentence(said: dict[str, object], sentence: str)
 
 
 def test_large_picture_is_scaled_down() -> None:
-    small = image_of(jpeg_of(Image.new("RGB", (3_000, 1_500), RED)))
+    small = decode_image(encode_jpeg(Image.new("RGB", (3_000, 1_500), RED)))
     assert small.size == (1024, 512)
-    assert image_of(jpeg_of(Image.new("RGBA", (40, 20), (255, 0, 0, 255)))).size == (40, 20)
+    assert decode_image(encode_jpeg(Image.new("RGBA", (40, 20), (255, 0, 0, 255)))).size == (40, 20)
 
 
 def test_box_is_drawn_where_it_was_found() -> None:
     image = Image.new("RGB", (200, 100), RED)
-    drawn = boxed(image, Sighting(found=True, box=(0.5, 0.5, 1.0, 1.0), score=0.9))
+    drawn = with_box(image, Sighting(found=True, box=(0.5, 0.5, 1.0, 1.0), score=0.9))
     assert drawn.getpixel((100, 70)) == (255, 255, 0)
     assert drawn.getpixel((150, 75)) == RED == drawn.getpixel((50, 25)) == image.getpixel((100, 70))
-    assert boxed(image, Sighting(found=False, box=None, score=0.1)).getcolors() == [(20_000, RED)]
+    assert with_box(image, Sighting(found=False, box=None, score=0.1)).getcolors() == [(20_000, RED)]

@@ -289,8 +289,8 @@ def test_screens_are_counted_and_reported() -> None:
 def run(home: Path, program: str, seconds: float, work: Callable[[Mission, Face], None]) -> Mission:
     robot, face = with_face(seconds)
     with Reservation(robot, home) as reserved, Mission(home, robot.name) as mission:
-        mission.draft(program)
-        mission.check([])
+        mission.set_program(program)
+        mission.record_check([])
         mission.approve()
         with spawn(lambda: mission.run(reserved)):
             work(mission, face)

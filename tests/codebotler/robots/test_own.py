@@ -330,8 +330,8 @@ def test_a_mission_of_a_robot_that_could_not_be_stopped_has_failed(
     )
     assert isinstance(robot, SpellingRobot)
     with Reservation(robot, tmp_path) as reserved, Mission(tmp_path, robot.name) as mission:
-        mission.draft(f"def task_program():\n    {program}\n")
-        mission.check([])
+        mission.set_program(f"def task_program():\n    {program}\n")
+        mission.record_check([])
         mission.approve()
 
         def stop_soon() -> None:

@@ -30,7 +30,7 @@ from codebotler.missions.preflight import ask_rooms
 from codebotler.missions.storage.log import MissionState
 from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import CameraPicture, CancelledError, NotReadyError
-from codebotler.robots.open import check_readiness
+from codebotler.robots.open import list_readiness
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import FEEDBACK_SECONDS, METRES_PER_SECOND, OFFICE, SIMULATION
@@ -488,7 +488,7 @@ def test_command_keeps_a_house_rule(tmp_path: Path) -> None:
 
 
 def test_pyrobosim_is_listed_as_working() -> None:
-    (kind,) = (kind for kind in check_readiness() if kind.name == "pyrobosim")
+    (kind,) = (kind for kind in list_readiness() if kind.name == "pyrobosim")
     assert kind.works
 
 
@@ -506,8 +506,8 @@ def test_rules_about_its_position_hold_along_its_own_route(
     robot = Pyrobosim(world, speed=None)
     formula = parse(f'not tr.Exists(inside("{room}"))', skills=SKILLS.with_skill(POSE_IN_ROOM))
     mission = Mission(tmp_path, robot.name)
-    mission.draft("def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n")
-    mission.check([])
+    mission.set_program("def task_program():\n    go_to('printer room 1')\n    go_to('printer room 3')\n")
+    mission.record_check([])
     mission.approve()
     with Reservation(robot, tmp_path) as reserved, mission:
         room_map, place = ask_rooms(robot, mission.note, world)

@@ -12,7 +12,7 @@ import pytest
 from codebotler.core.errors import RobotError, UserError
 from codebotler.core.world import Person, Room, World
 from codebotler.robots.base import CameraPicture, CancelledError, Options, Robot
-from codebotler.robots.open import check_readiness, open_robot
+from codebotler.robots.open import list_readiness, open_robot
 from codebotler.robots.ros.kinds import INSTALL_ROS1, find_fix
 from codebotler.robots.simulated import METRES_PER_SECOND, Simulated
 
@@ -126,7 +126,7 @@ def test_simulated_robot_is_opened_by_name_and_needs_a_world() -> None:
 
 
 def test_every_kind_of_robot_is_listed_with_missing_requirements() -> None:
-    kinds = {kind.name: kind for kind in check_readiness()}
+    kinds = {kind.name: kind for kind in list_readiness()}
     assert list(kinds) == ["sim", "pyrobosim", "ros1", "rosbridge", "ros2"]
     assert kinds["sim"].works
     assert all(kind.works or kind.missing for kind in kinds.values())
@@ -134,7 +134,7 @@ def test_every_kind_of_robot_is_listed_with_missing_requirements() -> None:
 
 @pytest.mark.parametrize("python", [Path(sys.executable), Path("/no/such/python")])
 def test_robots_on_ros_are_checked_with_the_given_python(python: Path) -> None:
-    kinds = {kind.name: kind for kind in check_readiness(python)}
+    kinds = {kind.name: kind for kind in list_readiness(python)}
     for name in ("ros1", "ros2"):
         assert not kinds[name].works
         assert kinds[name].missing.startswith(str(python))
@@ -142,7 +142,7 @@ def test_robots_on_ros_are_checked_with_the_given_python(python: Path) -> None:
 
 def test_each_fix_is_a_command(tmp_path: Path) -> None:
     mends = [
-        kind.mend for path in (sys.executable, "/no", "/bin/false") for kind in check_readiness(Path(path))
+        kind.mend for path in (sys.executable, "/no", "/bin/false") for kind in list_readiness(Path(path))
     ]
     mends += [
         INSTALL_ROS1,

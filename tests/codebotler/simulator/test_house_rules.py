@@ -376,7 +376,7 @@ def test_inconclusive_leaving_rule_is_broken() -> None:
     one = SimulatedRobot(WORLD, AS_WRITTEN, guard=guard)
     one.perform("ask", ["ann", "tea?", (Option("1", is_text=False), Option("yes"))])
     violate(one, "go_to", "office")
-    assert guard.at_end() is not None
+    assert guard.find_first_unkept() is not None
 
 
 @pytest.mark.parametrize("calls", [[ON], [ON, OFF]])
@@ -385,7 +385,7 @@ def test_leaving_rule_must_hold_at_the_end(switches: SkillTable, calls: list[tup
     one = SimulatedRobot(WORLD, AS_WRITTEN, switches, guard=guard)
     for name, argument in calls:
         one.perform(name, [argument])
-    assert (guard.at_end() is None) is (OFF in calls)
+    assert (guard.find_first_unkept() is None) is (OFF in calls)
 
 
 def test_program_may_catch_the_refusal_of_a_leaving_rule(worker: Worker, switches: SkillTable) -> None:
@@ -547,9 +547,9 @@ def test_rules_ignore_blanks_around_options_and_names() -> None:
 def test_rule_about_the_end_is_judged_at_the_end() -> None:
     report = Rule("report", "Report.", parse('tr.Exists(say("done"))'), "finally")
     guard = RuleGuard([report])
-    assert str(guard.at_end()) == 'the rule "report" is not kept at the end: Report'
-    guard.happened(Event("say", "done"))
-    assert guard.at_end() is None
+    assert str(guard.find_first_unkept()) == 'the rule "report" is not kept at the end: Report'
+    guard.judge_result(Event("say", "done"))
+    assert guard.find_first_unkept() is None
 
 
 # --- in the engine

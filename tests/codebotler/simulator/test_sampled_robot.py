@@ -318,7 +318,7 @@ def test_long_search_that_found_the_person_once_excuses_nothing() -> None:
         robot = search_rooms("alice", in_kitchen=False, in_lab=True, seed=robot.sampler.seed + 1)
         robot.perform("go_to", ["start_loc"])
         look(robot, "alice")
-    assert len(robot.searches["alice"].vain) == 2
+    assert len(robot.searches["alice"].rooms_without) == 2
     assert failure(robot, "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
     assert robot.excuses == set()
 

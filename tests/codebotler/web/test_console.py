@@ -62,7 +62,7 @@ class Author:
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:  # noqa: ARG002 - models take it
         self.asked.append(prompt)
         if not self.programs:
-            raise ModelError("the model is not there", may_pass=False)
+            raise ModelError("the model is not there", is_temporary=False)
         program = self.programs.pop(0)
         on_text(program[:10])
         if self.waits:
@@ -627,7 +627,7 @@ def test_a_stop_does_not_wait_for_a_check(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_missions_of_a_dead_tool_are_listed(tmp_path: Path) -> None:
     mission = Mission(tmp_path, "simulated")
-    mission.draft(HELLO)
+    mission.set_program(HELLO)
     mission._close()
     with make_console(tmp_path) as console:
         assert [summary.id for summary in console.interrupted] == [mission.id]

@@ -59,7 +59,7 @@ class Author:
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:  # noqa: ARG002 - models take it
         self.asked.append(prompt)
         if not self.programs:
-            raise ModelError("the model is not there", may_pass=False)
+            raise ModelError("the model is not there", is_temporary=False)
         program = self.programs.pop(0)
         if not self.programs:
             self.before_last()

@@ -13,7 +13,7 @@ from command_line import refused, roboeval
 from made_results import results_of
 from roboeval.analysis.comparisons.compare import compare_tables, has_missions, sample_size_sentences
 from roboeval.analysis.statistics import SampleSizes
-from roboeval.cli.inputs import open_current
+from roboeval.cli.inputs import open_with_results
 from roboeval.cli.results.report import judged_run
 from roboeval.evaluation.runs.results import load_results
 from roboeval.report.runs import JudgedRun
@@ -129,7 +129,7 @@ def test_a_report_with_house_rules_counts_the_missions_that_they_end(
     rules = tmp_path / "house.yaml"
     rules.write_text("rules: [{name: stay, says: Stay., always: 'not tr.Exists(goto(\".*\"))'}]")
     roboeval("evaluate", str(agents), "--suite", suite, "--rules", str(rules))
-    results = open_current(agents, suite, ablated=False)
+    results = open_with_results(agents, suite, ablated=False)
     run = judged_run(results, suite, beside=None, rules=rules, engine=None)
     ((_, _, missions, succeed, _, _, forbidden, *_),) = mode_sheet([run]).rows
     assert (missions, succeed, forbidden) == (4, 0.5, 0.25)

@@ -9,7 +9,7 @@ import pytest
 from codebotler.core.files import to_line
 from codebotler.rtl import parse
 from command_line import refused, roboeval
-from roboeval.analysis.search import TraceMatch, TraceQuery, match_row
+from roboeval.analysis.search import TraceMatch, TraceQuery, search_row
 
 
 def row(index: int, *traces: list[list[object]], passed: bool = False, task: str = "Visit") -> dict[str, Any]:
@@ -35,7 +35,7 @@ def matches(question: TraceQuery, rows: list[dict[str, Any]] | None = None) -> l
 
 
 def search(rows: list[dict[str, Any]], question: TraceQuery) -> list[TraceMatch]:
-    return [match_row(json.loads(to_line(row)), question) for row in rows]
+    return [search_row(json.loads(to_line(row)), question) for row in rows]
 
 
 HALL = parse('tr.Exists(goto("hall"))')

@@ -10,8 +10,8 @@ from roboeval.analysis.failure_groups import (
     MAX_COMPARED_CHARACTERS,
     normalised_lines,
     passing_programs,
-    shortest_fix,
     similarity,
+    smallest_difference,
 )
 
 ONE = """\
@@ -85,34 +85,36 @@ def test_the_shortest_fix() -> None:
     wrong = "def task_program():\n    go_to('hall')\n    say('x')\n"
     near = wrong.replace("'x'", "'y'")
     far = "def task_program():\n    pass\n"
-    fix = shortest_fix(wrong, passing_programs([("far", far), ("near", near), ("again", near)]))
+    fix = smallest_difference(wrong, passing_programs([("far", far), ("near", near), ("again", near)]))
     assert fix is not None
     assert (fix.name, fix.changed) == ("near", 2)
     assert fix.changes[-2:] == (("-", "    say('x')"), ("+", "    say('y')"))
-    assert shortest_fix(wrong, {}) is None
+    assert smallest_difference(wrong, {}) is None
 
 
 def test_the_first_of_equally_near_programs_is_the_fix() -> None:
-    fix = shortest_fix("a\nb\n", passing_programs([("one", "a\nc\n"), ("two", "a\nd\n")]))
+    fix = smallest_difference("a\nb\n", passing_programs([("one", "a\nc\n"), ("two", "a\nd\n")]))
     assert fix is not None
     assert fix.name == "one"
 
 
 def test_lines_that_only_move_are_changes() -> None:
-    fix = shortest_fix("a\nb\n", passing_programs([("moved", "b\na\n")]))
+    fix = smallest_difference("a\nb\n", passing_programs([("moved", "b\na\n")]))
     assert fix is not None
     assert fix.changed == 2
 
 
 def test_omitted_lines_of_a_difference_are_marked() -> None:
     lines = [f"line {n}" for n in range(30)]
-    fix = shortest_fix("\n".join(lines), passing_programs([("p", "\n".join([*lines[:29], "other"]))]))
+    fix = smallest_difference("\n".join(lines), passing_programs([("p", "\n".join([*lines[:29], "other"]))]))
     assert fix is not None
     assert fix.changes[0] == (" ", "...")
     assert [sign for sign, _ in fix.changes] == [" ", " ", " ", "-", "+"]
 
 
 def test_the_same_lines_in_another_order_may_be_further_than_other_lines() -> None:
-    fix = shortest_fix("a\nb\nc\n", passing_programs([("turned", "c\nb\na\n"), ("other", "a\nb\nd\n")]))
+    fix = smallest_difference(
+        "a\nb\nc\n", passing_programs([("turned", "c\nb\na\n"), ("other", "a\nb\nd\n")])
+    )
     assert fix is not None
     assert (fix.name, fix.changed) == ("other", 2)

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from command_line import refused, roboeval
-from roboeval.cli.inputs import open_current
+from roboeval.cli.inputs import open_with_results
 from roboeval.cli.results.report import judged_run
 from roboeval.report.page import page
-from roboeval.report.sections.failures import house
+from roboeval.report.sections.failures import house_rules_section
 
 RULES = """
 rules:
@@ -104,10 +104,10 @@ def test_an_interval_without_variation_is_unknown(folder: Path) -> None:
     shown = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder).out
     assert "100.0% of a prompt's programs" in shown
     assert "(95% interval over tasks unknown: no variation between tasks)" in " ".join(shown.split())
-    results = open_current(folder / "run", "paper", ablated=False)
+    results = open_with_results(folder / "run", "paper", ablated=False)
     run = judged_run(results, "paper", beside=None, rules=folder / "house.yaml", engine=None)
     assert "the interval of the share that breaks a rule is unknown: no variation between tasks." in page(
-        "a report", [], [house([run])], {}
+        "a report", [], [house_rules_section([run])], {}
     )
 
 

@@ -29,8 +29,8 @@ from roboeval.suites.load import Suite
 from scripted_model import Scripted
 
 SMALL = frozenset({"LunchTime", "SayGoodDay"})
-CUT = ModelError("the connection was cut", may_pass=True)
-REFUSED = ModelError("the key in SCRIPTED_API_KEY is refused", may_pass=False)
+CUT = ModelError("the connection was cut", is_temporary=True)
+REFUSED = ModelError("the key in SCRIPTED_API_KEY is refused", is_temporary=False)
 
 
 def generate(
@@ -278,7 +278,7 @@ def test_failed_requests_are_missing_and_repeated_later(tmp_path: Path, paper: S
     assert about(run)["possibly_paid_twice"] == 0
 
 
-REFUSAL = ModelError("the server answered with status 400 (no)", may_pass=False, is_refusal=True)
+REFUSAL = ModelError("the server answered with status 400 (no)", is_temporary=False, is_refusal=True)
 
 
 def test_refused_prompt_is_a_completion_without_a_program(tmp_path: Path, paper: Suite) -> None:

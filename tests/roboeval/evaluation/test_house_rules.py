@@ -79,7 +79,7 @@ def test_a_blind_guard_is_noticed(measuring: Measuring, monkeypatch: pytest.Monk
         """Ignore all events."""
 
     monkeypatch.setattr(RuleGuard, "judge", ignore_events)
-    monkeypatch.setattr(RuleGuard, "happened", ignore_events)
+    monkeypatch.setattr(RuleGuard, "judge_result", ignore_events)
     found = effects(measuring, "GetDrink", HASTY)["permission-to-take"]
     assert (found.broken, found.executed) == (3, 3)
 

@@ -23,7 +23,7 @@ from codebotler.rtl.semantics import compared_fields
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
-from roboeval.analysis.search import TraceMatch, TraceQuery, match_row
+from roboeval.analysis.search import TraceMatch, TraceQuery, search_row
 from roboeval.evaluation.judging.explanation import SUITE_CHANGED, completion_data
 from roboeval.evaluation.judging.judge import is_met, judge_outcomes, run_in_worlds
 from roboeval.evaluation.judging.serialization import row_line
@@ -76,7 +76,7 @@ def explain_all(row: dict[str, Any], suite: Suite) -> list[str]:
 
 
 def find(row: dict[str, Any], formula: str) -> TraceMatch:
-    return match_row(row, TraceQuery(parse(formula)))
+    return search_row(row, TraceQuery(parse(formula)))
 
 
 def expect_agreement(worker: Worker, suite: Suite, program: str) -> list[bool]:

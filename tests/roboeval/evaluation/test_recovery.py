@@ -83,7 +83,9 @@ def mission(worker: Worker, suite: Suite) -> Interruption:
 def test_a_skill_fails_once_without_an_event(
     suite: Suite, skill: str, arguments: list[Any], kind: str
 ) -> None:
-    robot = RecordingRobot(suite.task("GetDrink").scenarios[0].world, suite, made=[("say", ["a"])], fault=1)
+    robot = RecordingRobot(
+        suite.task("GetDrink").scenarios[0].world, suite, earlier_calls=[("say", ["a"])], fault=1
+    )
     with pytest.raises(RobotError) as raised:
         robot.perform(skill, arguments)
     assert raised.value.kind == kind
@@ -176,7 +178,7 @@ class RefusingModel:
         await asyncio.sleep(0)
         self.asked.append(prompt.instruction)
         if prompt.instruction == "bad":
-            raise ModelError("no", may_pass=False, is_refusal=True)
+            raise ModelError("no", is_temporary=False, is_refusal=True)
         return Reply("", prompt.instruction, Usage(), None, None)
 
     async def close(self) -> None:

@@ -74,7 +74,7 @@ def test_at_most_all_mutants_are_sampled() -> None:
 
 @pytest.mark.slow
 def test_originals_are_right_solutions_and_named_programs(paper: Suite) -> None:
-    further = (Original("mine", GOES, claimed=False), Original("again", GOES))
+    further = (Original("mine", GOES, declared_right=False), Original("again", GOES))
     for task in paper.tasks.values():
         found = originals(task, further)
         assert len({original.name for original in found}) == len(found) > 15, task.name

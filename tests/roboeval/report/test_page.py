@@ -12,7 +12,7 @@ from made_up_runs import HOSTILE, UNCHECKED, cases, new_run
 from roboeval.report.page import page
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import Prose, ReportFigure, Section, format_cell, sheet
-from roboeval.report.writing import expect_no_others, pieces, sections, write_report
+from roboeval.report.writing import count_parts, expect_no_others, sections, write_report
 
 
 class Tags(HTMLParser):
@@ -55,7 +55,7 @@ def page_of(runs: list[JudgedRun]) -> str:
 
 def write_whole_report(folder: Path) -> Path:
     found = parts(cases()["usual"])
-    assert len([*write_report("a report", ["about it"], found, folder)]) == pieces(found)
+    assert len([*write_report("a report", ["about it"], found, folder)]) == count_parts(found)
     return folder
 
 

@@ -27,8 +27,8 @@ from roboeval.report.sections.breakdown import (
 )
 from roboeval.report.sections.cost import budget_sheet, cost_sheet
 from roboeval.report.sections.failures import failures_section
-from roboeval.report.sections.question import question
-from roboeval.report.sections.scores import differences
+from roboeval.report.sections.question import question_section
+from roboeval.report.sections.scores import differences_section
 from roboeval.report.sheets import Groups, Prose, Sheet
 from roboeval.report.writing import about_suite, origin_sheet
 
@@ -154,23 +154,23 @@ def test_a_price_for_a_folder_overrides_that_for_its_model() -> None:
 
 
 def test_differences_are_of_all_pairs_or_with_the_best() -> None:
-    said, table = differences(usual()).parts
+    said, table = differences_section(usual()).parts
     assert isinstance(said, Prose)
     assert isinstance(table, Sheet)
     assert [row[0] for row in table.rows] == ["middle minus strong", "weak minus strong", "weak minus middle"]
     assert len(said.paragraphs) == 3
-    assert differences(usual()[:1]).parts == []
-    _, table = differences([new_run(f"m{n}", {"Visit": (n,)}) for n in range(8)]).parts
+    assert differences_section(usual()[:1]).parts == []
+    _, table = differences_section([new_run(f"m{n}", {"Visit": (n,)}) for n in range(8)]).parts
     assert isinstance(table, Sheet)
     assert {row[0].split(" minus ")[0] for row in table.rows} == {"m7"}
-    assert differences([new_run("a", {"Visit": (1,)}), new_run("b", {"FindBook": (1,)})]).parts == []
+    assert differences_section([new_run("a", {"Visit": (1,)}), new_run("b", {"FindBook": (1,)})]).parts == []
 
 
 def test_pairs_with_different_settings_have_a_note() -> None:
     one, other = (
         new_run(name, {"Visit": (n,)}, about={"settings": {"temperature": n}}) for n, name in enumerate("ab")
     )
-    _, table = differences([one, other]).parts
+    _, table = differences_section([one, other]).parts
     assert isinstance(table, Sheet)
     _, note = table.notes
     assert re.search(r"^a and b: temperature\b.* 0 and 1", note)
@@ -220,7 +220,7 @@ def test_gains_of_a_question_by_run_and_by_prompt(tmp_path: Path) -> None:
     ]
     data = measurement_data(measured.results.completions.values(), SUITE, ClarifySettings(3, 0.1, 7), prompts)
     store_measurement(measured.results.run, SUITE, data)
-    by_run, by_prompt = question([measured, plain]).parts
+    by_run, by_prompt = question_section([measured, plain]).parts
     assert isinstance(by_run, Sheet)
     assert as_dicts(by_run) == [
         {
@@ -244,8 +244,8 @@ def test_gains_of_a_question_by_run_and_by_prompt(tmp_path: Path) -> None:
     assert [first[name] for name in ("task", "model", "candidates", "noise", "seed")] == [
         *("Visit", "a", 3, 0.1, 7)
     ]
-    assert question([plain]).parts == []
+    assert question_section([plain]).parts == []
     store_measurement(measured.results.run, SUITE, {**data, "digest": "other"})
-    (outdated,) = question([measured, plain]).parts
+    (outdated,) = question_section([measured, plain]).parts
     assert isinstance(outdated, Prose)
     assert [words.partition(":")[0] for words in outdated.paragraphs] == ["a"]

@@ -18,7 +18,7 @@ from roboeval.evaluation.runs.results import read_results
 from roboeval.evaluation.runs.source import open_source
 from roboeval.report import paper
 from roboeval.report.runs import JudgedRun, name_runs, read_labels
-from roboeval.report.sections.cost import rejection_sampling
+from roboeval.report.sections.cost import rejection_sampling_section
 from roboeval.report.sections.failures import all_causes, causes_sheet, published_notes
 from roboeval.report.sections.scores import curve_sheet, overall_sheet, prompt_sheet, task_sheet
 from roboeval.report.sheets import Column, Sheet, format_cell, note, page_text, page_words, write_csv
@@ -70,12 +70,12 @@ def test_an_interval_without_width_is_in_the_table() -> None:
 def test_retries_agree_with_shares_of_accepted_programs() -> None:
     run, other = new_run("a", {"Visit": (5,)}), new_run("b", {"Visit": (5,)}, accepted=UNCHECKED)
     share = accepted_after(run.checked, 100)
-    found = [part for part in rejection_sampling([run, other]).parts if isinstance(part, Sheet)]
+    found = [part for part in rejection_sampling_section([run, other]).parts if isinstance(part, Sheet)]
     assert column(found[0], "at the limit") == pytest.approx([1 - share[n] for n in (0, 2, 4, 8, 100)])
     assert [part.name for part in found] == ["rejection-sampling", "rejection-sampling-curves", "accepted"]
     assert {row[0] for row in found[0].rows} == {"a"}
     assert column(found[2], "a") == share
-    assert rejection_sampling([other]).parts == []
+    assert rejection_sampling_section([other]).parts == []
 
 
 # --- the paper's numbers
@@ -181,7 +181,7 @@ def test_published_causes_are_shown_only_on_request() -> None:
 
 def judge_in(folder: Path, completions: Path, suite: Suite) -> JudgedRun:
     run = RunFolder(folder)
-    run.keep(open_source(str(completions), suite).completions)
+    run.import_completions(open_source(str(completions), suite).completions)
     for _ in evaluate_run(run, suite, tasks=None, ablated=False, redo=False, workers=2):
         pass
     results = read_results(run, "paper", suite)

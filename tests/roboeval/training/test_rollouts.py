@@ -14,7 +14,7 @@ from codebotler.simulator.worker import EngineError
 from roboeval import reward
 from roboeval.evaluation import rewards
 from roboeval.suites.families.suite import FIRST_SEEDS
-from roboeval.suites.families.tasks import TrainedTask, trained_task
+from roboeval.suites.families.tasks import GeneratedTask, trained_task
 from roboeval.suites.suite import HouseRules
 from roboeval.training import prompts
 from roboeval.training.prompts import load_prompts, program_in
@@ -107,7 +107,7 @@ def test_prompts_stay_the_same_bytes() -> None:
 def test_only_one_task_of_each_family_gets_worlds(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[str] = []
 
-    def record_family(family: str, seed: int) -> TrainedTask:
+    def record_family(family: str, seed: int) -> GeneratedTask:
         made.append(family)
         return trained_task(family, seed)
 

@@ -25,7 +25,7 @@ from made_up_runs import new_run
 from pageserver import PageServer
 from roboeval.evaluation.runs.completions import KEY, Completion
 from roboeval.evaluation.runs.folder import RunFolder
-from roboeval.report.sections.scores import results
+from roboeval.report.sections.scores import results_section
 from roboeval.report.sheets import Section, Sheet
 from roboeval.report.writing import write_report
 from runs_server import serve_runs
@@ -89,7 +89,9 @@ def test_one_run_has_the_numbers_of_show(server: PageServer, folder: Path) -> No
 
 def test_the_report_of_a_run_opens(server: PageServer, folder: Path) -> None:
     report = folder / "hasty" / "report"
-    tables = [part for part in results([new_run("hasty", {"Visit": (3,)})]).parts if isinstance(part, Sheet)]
+    tables = [
+        part for part in results_section([new_run("hasty", {"Visit": (3,)})]).parts if isinstance(part, Sheet)
+    ]
     list(write_report("a report", [], [Section("results", tables)], report))  # Figures take long.
     assert server.call("GET", "/api/runs/hasty/report").status == 200
     table = server.call("GET", "/api/runs/hasty/tables/overall.csv")

@@ -93,7 +93,7 @@ def _is_by_result(rule: Rule, breaks: Trace) -> bool:
     guard = RuleGuard([rule])
     try:
         for event in breaks[:-1]:
-            guard.happened(event)
+            guard.judge_result(event)
     except RuleViolationError:
         return False
     last = breaks[-1]

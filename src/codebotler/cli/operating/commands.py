@@ -156,9 +156,9 @@ def robots(
 
     from codebotler.cli.views import robots_view
     from codebotler.core.terminal import print_found
-    from codebotler.robots.open import check_readiness
+    from codebotler.robots.open import list_readiness
 
-    found = check_readiness(ros_python)
+    found = list_readiness(ros_python)
     print_found(lambda: robots_view(found), lambda: list(map(asdict, found)), as_json=json)
 
 

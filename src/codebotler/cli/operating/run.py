@@ -252,8 +252,8 @@ def choose_past(console: Console, name: str, program: str) -> MissionPast:
     if past.unsure is None:
         return past
     if program == "-":
-        raise UserError(f"{past.question}; name a file for the rest, since a person must answer here")
-    for sentence in (past.question, *ask_evidence(console.robot, console.home, past, note)):
+        raise UserError(f"{past.unsure_step_text}; name a file for the rest, since a person must answer here")
+    for sentence in (past.unsure_step_text, *ask_evidence(console.robot, console.home, past, note)):
         note(sentence)
     happened = _ask_whether(past)
     while happened and past.answers:
@@ -273,7 +273,7 @@ def _ask_whether(past: MissionPast) -> bool:
         if word in {"y", "yes", "n", "no"}:
             return word.startswith("y")
         note("answer y or n, or press Ctrl-C to end here")
-    raise UserError(f"{past.question}; a person must answer y or n")
+    raise UserError(f"{past.unsure_step_text}; a person must answer y or n")
 
 
 def past_view(past: MissionPast) -> Group:

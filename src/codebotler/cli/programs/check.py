@@ -50,7 +50,8 @@ def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool =
         parts += [Text(), *_problem(problem, lines)]
     parts += [Text(), _rooms(found), *_vain_searches(found)]
     parts += [Text(found.assumption, "dim")] if found.assumption else []
-    parts += [Text(f'the rule "{one.rule}" {one.words}', PROOF_STYLES[one.verdict]) for one in found.proofs]
+    for proof in found.proofs:
+        parts.append(Text(f'the rule "{proof.rule}" {proof.in_words}', PROOF_STYLES[proof.verdict]))
     kinds = _distinct_samples(found)
     for sample in kinds if shows_all else kinds[:1]:
         parts += [Text(), *_sample(sample)]

@@ -86,7 +86,7 @@ def _example(row: Skill) -> list[Any]:
         except ValueError:
             example = None
         if example is None or not parameter.type.fits(example):
-            row.wrong(f"{parameter.name} in the example of {row.name} must be {parameter.words}")
+            row.wrong(f"{parameter.name} in the example of {row.name} must be {parameter.in_words}")
         if parameter.is_options:
             example = [Option(text) for text in example]
         given.append(tuple(example) if isinstance(example, list) else example)

@@ -18,7 +18,7 @@ def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # n
     """Call a custom skill's function. Raise RobotError if it fails, or UserError if its result is wrong."""
     assert row.does is not None, "a custom skill has a function"
     given = [
-        [option.text for option in argument] if parameter.is_options else parameter.type.wanted(argument)
+        [option.text for option in argument] if parameter.is_options else parameter.type.convert(argument)
         for parameter, argument in zip(row.parameters, arguments, strict=True)
     ]
     code = getattr(row.does, "__wrapped__", row.does).__code__
@@ -37,6 +37,6 @@ def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # n
         ) from error
     asks = [one for one, parameter in zip(given, row.parameters, strict=True) if parameter.is_options]
     if (asks and result not in asks[0]) or not row.returns.fits(result):
-        must = "one of the given options" if asks else row.returns.words
+        must = "one of the given options" if asks else row.returns.in_words
         row.wrong(f"{row.name} returned {result!r:.80}, but its function must return {must}")
     return result

@@ -28,9 +28,9 @@ class Parameter:
         return "list" if self.is_options else self.type.kind
 
     @property
-    def words(self) -> str:
+    def in_words(self) -> str:
         """The expected values in words, such as `a whole number`."""
-        return "a list" if self.is_options else self.type.words
+        return "a list" if self.is_options else self.type.in_words
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ class ValueType:
         return f"list[{one}]" if self.is_list else one
 
     @property
-    def words(self) -> str:
+    def in_words(self) -> str:
         """The expected values in words, such as `a whole number` or `"red" or "green"`."""
         if self.base is None:
             return "nothing"
@@ -84,10 +84,10 @@ class ValueType:
             return False
         return not self.choices or value in self.choices
 
-    def wanted(self, value: Any) -> Any:  # noqa: ANN401 - any of these types
+    def convert(self, value: Any) -> Any:  # noqa: ANN401 - any of these types
         """Convert an argument for the skill's function: `"red"` to `Color.RED` for an Enum, or 3 to 3.0."""
         if isinstance(value, list | tuple):
-            return [self.wanted(each) for each in value]
+            return [self.convert(each) for each in value]
         if self.enum is not None:
             return self.enum(value)
         return float(value) if self.base == "float" else value

@@ -67,7 +67,7 @@ class TextTemplate:
         return _are_in_order(self._pieces, other.joined)
 
     @staticmethod
-    def beyond(templates: Iterable[TextTemplate], allowed: Iterable[TextTemplate]) -> list[TextTemplate]:
+    def excess(templates: Iterable[TextTemplate], allowed: Iterable[TextTemplate]) -> list[TextTemplate]:
         """Return those of `templates` that no template in `allowed` covers; fast for texts without holes."""
         known = [*allowed]
         exact, open_ones = {one.joined for one in known}, [one for one in known if len(one.parts) > 1]

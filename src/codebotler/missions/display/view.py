@@ -53,7 +53,7 @@ class MissionOrder:
 
     def __post_init__(self) -> None:
         if self.past is not None and self.past.unsure is not None:
-            raise UserError(f"{self.past.question}; a person must say whether this happened")
+            raise UserError(f"{self.past.unsure_step_text}; a person must say whether this happened")
         if not self.has_program:
             clean_instruction(self.instruction)
 

@@ -88,12 +88,12 @@ class MissionPast:
         """The robot's steps that did not fail, in words."""
         return [_step_words(event) for event in self.trace if not event.failed]
 
-    def here(self, place: str) -> str:
+    def position_text(self, place: str) -> str:
         """Return a sentence that says that the robot is at `place`, and what it holds."""
         return f'The robot is in "{shortened(place)}" and holds {self._held_words}.'
 
     @property
-    def was(self) -> str:
+    def last_position_text(self) -> str:
         """A sentence that says where the robot was last and what it held, by the log; empty if unknown."""
         where = f'the robot was in "{shortened(self.place)}" and held {self._held_words}'
         return f"Just before that, {where}, says the log." if self.place else ""
@@ -103,7 +103,7 @@ class MissionPast:
         return f'"{shortened(self.held)}"' if self.held else "nothing"
 
     @property
-    def question(self) -> str:
+    def unsure_step_text(self) -> str:
         """A clause that names the unsure step, for a question to a person; empty if there is no such step."""
         if self.unsure is None:
             return ""
@@ -175,7 +175,7 @@ def read_past(
     summary = MissionSummary.read(folder)
     if robot_kind not in {"", summary.robot}:
         raise UserError(f"mission {summary.id} ran on {summary.robot} and cannot continue on {robot_kind}")
-    expect_rest(folder)
+    expect_continuable(folder)
     events = read_events(folder)
     before: LogLine = next((line for line in events if line["event"] == "past"), {})
     has_run = any(line["event"] == "state" and line["state"] == MissionState.RUNNING for line in events)
@@ -207,7 +207,7 @@ def read_past(
     )
 
 
-def expect_rest(folder: Path) -> None:
+def expect_continuable(folder: Path) -> None:
     """Raise UserError if the mission in a folder has not ended, is done, or was already continued."""
     summary = MissionSummary.read(folder)
     if not summary.has_ended:

@@ -164,14 +164,15 @@ class ChatModel:
             case exceptions.ModelAPIError(__cause__=openai.APIError(body=body)) if body is not None:
                 return error_in_reply(self.name, body)
             case exceptions.ModelAPIError() | exceptions.ContentFilterError() | exceptions.UserError():
-                may_pass = isinstance(error, exceptions.ModelAPIError) and not is_out_of_money
+                is_temporary = isinstance(error, exceptions.ModelAPIError) and not is_out_of_money
                 no_connection = connection_error(self.name, error, self.settings.base_url)
-                return no_connection or model_error(self.name, error, may_pass=may_pass)
+                return no_connection or model_error(self.name, error, is_temporary=is_temporary)
             case exceptions.UnexpectedModelBehavior():
                 return incomplete_error(self.name, has_begun=False)
         library = type(error).__module__.split(".")[0]
-        is_transport = isinstance(error, OSError) or library in TRANSPORT_PACKAGES
-        return model_error(self.name, f"{type(error).__name__}: {error_text(error)}", may_pass=is_transport)
+        is_temporary = isinstance(error, OSError) or library in TRANSPORT_PACKAGES
+        fault = f"{type(error).__name__}: {error_text(error)}"
+        return model_error(self.name, fault, is_temporary=is_temporary)
 
 
 def _piece_of(event: object) -> tuple[str, bool]:

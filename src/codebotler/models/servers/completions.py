@@ -83,7 +83,8 @@ class CompletionsModel:
                 failed.sentence, Usage(), latency, None, known_kind="filtered", has_answer=False
             )
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
-            raise model_error(self.name, f"the server sent invalid JSON ({error})", may_pass=True) from None
+            fault = f"the server sent invalid JSON ({error})"
+            raise model_error(self.name, fault, is_temporary=True) from None
         if chunks.error is not None:
             raise error_in_reply(self.name, chunks.error)
         if not chunks.is_whole:
@@ -135,4 +136,4 @@ class CompletionsModel:
         if isinstance(error, openai.APIError) and error.body is not None:
             return error_in_reply(self.name, error.body)
         no_connection = connection_error(self.name, error, self.settings.base_url)
-        return no_connection or model_error(self.name, error, may_pass=True)
+        return no_connection or model_error(self.name, error, is_temporary=True)

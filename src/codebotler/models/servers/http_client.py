@@ -41,7 +41,7 @@ def limit_replies(client: HTTPClient, name: str, limit: int) -> HTTPClient:
         coding = response.headers.get("content-encoding", "identity")
         if coding != "identity":
             sentence = f"{name}: the server compressed its reply ({coding}); turn off its compression"
-            raise ModelError(sentence, may_pass=False)
+            raise ModelError(sentence, is_temporary=False)
         response.stream = _limit_stream(response.stream, name, limit)
         if response.has_redirect_location:
             # Leave out parts that may be secret.
@@ -49,7 +49,7 @@ def limit_replies(client: HTTPClient, name: str, limit: int) -> HTTPClient:
                 userinfo=b"", query=None, fragment=None
             )
             sentence = f"{name}: the server redirects to {address}; change the base URL accordingly"
-            raise ModelError(sentence, may_pass=False)
+            raise ModelError(sentence, is_temporary=False)
         is_json = response.headers.get("content-type", "").startswith("application/json")
         if is_json and response.status_code < FIRST_ERROR and b'"stream":true' in response.request.content:
             raise _error_instead_of_stream(name, await response.aread())
@@ -68,7 +68,7 @@ def _error_instead_of_stream(name: str, body: bytes) -> ModelError:
     if isinstance(reply, dict) and reply.get("choices") is None:
         return error_in_reply(name, reply.get("error") or reply)
     return model_error(
-        name, "the server sent its reply in one piece, but only streams are supported", may_pass=False
+        name, "the server sent its reply in one piece, but only streams are supported", is_temporary=False
     )
 
 
@@ -83,7 +83,7 @@ def _limit_stream(stream: Any, name: str, limit: int) -> Any:  # noqa: ANN401 - 
                 remaining -= len(piece)
                 if remaining < 0:
                     raise ModelError(
-                        f"{name}: the server sent more than {limit:,} bytes for one reply", may_pass=False
+                        f"{name}: the server sent more than {limit:,} bytes for one reply", is_temporary=False
                     )
                 yield piece
 

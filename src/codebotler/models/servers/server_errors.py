@@ -36,13 +36,13 @@ RETRYABLE_WORDS = re.compile(
 """Matches the types and codes of temporary errors."""
 
 
-def model_error(name: str, fault: str | Exception, *, may_pass: bool) -> ModelError:
+def model_error(name: str, fault: str | Exception, *, is_temporary: bool) -> ModelError:
     """Build a model's error from a sentence, or from an exception and its original cause."""
     first: BaseException | None = fault if isinstance(fault, Exception) else None
     while first and first.__cause__:
         first = first.__cause__
     cause = "" if first is None or str(first) in str(fault) else f" ({error_text(first)})"
-    return ModelError(f"{name}: {error_text(fault)}{cause}", may_pass=may_pass)
+    return ModelError(f"{name}: {error_text(fault)}{cause}", is_temporary=is_temporary)
 
 
 def connection_error(name: str, error: Exception, url: str | None) -> ModelError | None:
@@ -52,7 +52,7 @@ def connection_error(name: str, error: Exception, url: str | None) -> ModelError
         return None
     fix = "check the network" if url is None else "check the base URL, and whether the server is running"
     sentence = f"{name}: no connection to {url or 'its server'} ({error_text(failed)}); {fix}"
-    return ModelError(sentence, may_pass=True)
+    return ModelError(sentence, is_temporary=True)
 
 
 def find_model_error(error: Exception) -> ModelError | None:
@@ -69,12 +69,12 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 def incomplete_error(name: str, *, has_begun: bool) -> ModelError:
     """Build the error for a stream that ended early, before or after the reply began."""
     nothing = "the server sent no completion; check the base URL"
-    return model_error(name, "the reply was cut off" if has_begun else nothing, may_pass=True)
+    return model_error(name, "the reply was cut off" if has_begun else nothing, is_temporary=True)
 
 
 def timeout_error(name: str, seconds: float) -> ModelError:
     """Build the error for a reply that did not arrive in time."""
-    return ModelError(f"{name}: no complete reply arrived within {seconds:g} s", may_pass=True)
+    return ModelError(f"{name}: no complete reply arrived within {seconds:g} s", is_temporary=True)
 
 
 def status_error(
@@ -83,9 +83,9 @@ def status_error(
     """Build the error for a status of 400 or more. A permanent error is not retried, whatever its status."""
     message = f" ({text})" if (text := error_text(body)) else ""
     sentence = f"{name}: the server answered with status {status}{message}{STATUS_HINTS.get(status, '')}"
-    may_pass = not is_permanent and (status >= SERVER_ERROR or status in RETRYABLE_STATUSES)
+    is_temporary = not is_permanent and (status >= SERVER_ERROR or status in RETRYABLE_STATUSES)
     is_refusal = not is_permanent and status in PROMPT_STATUSES and not ACCOUNT_WORDS.search(message)
-    return ModelError(sentence, may_pass=may_pass, retry_after=retry_after, is_refusal=is_refusal)
+    return ModelError(sentence, is_temporary=is_temporary, retry_after=retry_after, is_refusal=is_refusal)
 
 
 def error_in_reply(name: str, body: object) -> ModelError:
@@ -94,8 +94,9 @@ def error_in_reply(name: str, body: object) -> ModelError:
     code = next((fields[key] for key in ("code", "status") if fields.get(key)), None)
     if str(code).isdigit() and int(str(code)) > SUCCESS:
         return status_error(name, int(str(code)), body)
-    may_pass = bool(RETRYABLE_WORDS.search(f"{code} {fields.get('type')}"))
-    return ModelError(f"{name}: the server sent an error: {error_text(body) or 'no text'}", may_pass=may_pass)
+    is_temporary = bool(RETRYABLE_WORDS.search(f"{code} {fields.get('type')}"))
+    sentence = f"{name}: the server sent an error: {error_text(body) or 'no text'}"
+    return ModelError(sentence, is_temporary=is_temporary)
 
 
 def is_filtered(status: int | None, body: object) -> bool:

@@ -188,13 +188,13 @@ class RosRobot(RosCaller):
         self, seen: Future[tuple[bool, bytes]], model: str, message: Values, label: str, topic: str
     ) -> None:
         """Set whether something is in a picture, and the picture with a box around what was found."""
-        from codebotler.perception import PerceptionError, boxed, image_from_ros, jpeg_of  # noqa: PLC0415 - slow
+        from codebotler.perception import PerceptionError, encode_jpeg, image_from_ros, with_box  # noqa: PLC0415 - slow
 
         try:
             image = image_from_ros(message, f"the picture on {topic}")
             with self._looking:
                 sighting = self._detectors[model].look(image, label)
-            seen.set_result((sighting.found, jpeg_of(boxed(image, sighting))))
+            seen.set_result((sighting.found, encode_jpeg(with_box(image, sighting))))
         except (UserError, PerceptionError) as error:
             seen.set_exception(RobotError("IsInRoomFailed", str(error)))
         except Exception as error:  # noqa: BLE001 - raised again where the result is used

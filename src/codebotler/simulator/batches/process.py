@@ -24,7 +24,7 @@ from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
 from codebotler.simulator.sandbox.fork_server import RUN_DOOR, serve
 from codebotler.simulator.sandbox.isolation import give_up_rights, usable_filter
-from codebotler.simulator.sandbox.start import arrange, forget_the_shell
+from codebotler.simulator.sandbox.start import arrange, reset_inherited_settings
 from codebotler.simulator.sandbox.tame import GIVEN
 from codebotler.simulator.worlds.robot import Argument, SimulatedRobot
 from codebotler.simulator.worlds.sampled_robot import SampledRobot
@@ -47,7 +47,7 @@ UNDECIDED_RUN = b"null"  # replaces a transcript if the run must be repeated in 
 
 def main(*descriptors: str) -> None:
     """Prepare everything that batches share, then fork children to run them."""
-    forget_the_shell()
+    reset_inherited_settings()
     arrange(list(map(int, descriptors)))
     door = socket(fileno=RUN_DOOR)
     run = TranscribedRun()
@@ -120,7 +120,7 @@ class TranscribedRun(ProgramRun):
         self.namespace = ModuleType("__main__")
         vars(self.namespace).update(self.provided)
         self._calls: list[Called] = []
-        self.spent = self.entered = self.is_undecided = False
+        self.has_reached_limit = self.entered = self.is_undecided = False
         self.refused_at = None
         self.codes.clear()
         self.refuel()
@@ -135,7 +135,7 @@ class TranscribedRun(ProgramRun):
                 self._let_time_pass()
             answer = None if name in self.elsewhere else self.ledger.perform(name, given)
         except BaseException:  # the program is not at fault unless it reached a limit
-            self.is_undecided = self.is_undecided or not self.spent
+            self.is_undecided = self.is_undecided or not self.has_reached_limit
             raise
         if answer is None:
             return self._ask_engine(name, given)
@@ -145,7 +145,7 @@ class TranscribedRun(ProgramRun):
             raise robot_error(*value)
         self._calls.append((name, given, self.now, kind, value))
         if kind == "stop":
-            self.spent = True
+            self.has_reached_limit = True
             raise LimitReachedError
         return value.copy() if type(value) is list else value
 
@@ -153,7 +153,7 @@ class TranscribedRun(ProgramRun):
         """Report the program's clock to the ledger, and end the run if its time is up."""
         self.ledger.let_time_pass(self.now)
         if self.ledger.limit is not None:
-            self.spent = True
+            self.has_reached_limit = True
             raise LimitReachedError
 
     def request(self, request: str) -> NoReturn:  # noqa: ARG002 - as in ProgramRun
@@ -161,7 +161,7 @@ class TranscribedRun(ProgramRun):
         self._let_time_pass()
         raise LimitReachedError
 
-    def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
+    def except_hook(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
         """Return a function for each `except`: it marks runs that catch a recursion or memory error."""
 
         def caught() -> None:
@@ -202,7 +202,7 @@ class TranscribedRun(ProgramRun):
             self.ledger.errors.append(RobotError(*value[1:]))  # keeps the numbering in step with the engine's
             raise robot_error(*value)
         if kind == "stop":
-            self.spent = True
+            self.has_reached_limit = True
             raise LimitReachedError
         return value
 

@@ -93,14 +93,14 @@ class SkillBound:
             return ""
         return f'since it may happen in {_some(self.places)}, and not in "{brief(call.place)}"'
 
-    def beyond(self, other: SkillBound) -> SkillBound | None:
+    def excess_over(self, other: SkillBound) -> SkillBound | None:
         """Return the part of this bound that the other bound forbids, or None if it forbids nothing.
 
         If this bound is wider in several ways, such as more rooms and more calls, return all of it.
         """
         added: list[tuple[str, Templates]] = []
         for (name, templates), (_, allowed) in zip(self.texts, other.texts, strict=True):
-            added.append((name, tuple(TextTemplate.beyond(templates, allowed))))
+            added.append((name, tuple(TextTemplate.excess(templates, allowed))))
         places: tuple[str, ...] | None = ()
         if other.places is not None:
             known = {place.casefold() for place in other.places}
@@ -138,10 +138,10 @@ class Contract:
             return f"since {call.skill} may succeed at most {counted(bound.at_most, 'time')}"
         return bound.objection(call)
 
-    def beyond(self, other: Contract) -> Contract:
+    def excess_over(self, other: Contract) -> Contract:
         """Return a contract with only what this one allows and the other one forbids."""
         new = {
-            name: bound if name not in other.skills else bound.beyond(other.skills[name])
+            name: bound if name not in other.skills else bound.excess_over(other.skills[name])
             for name, bound in self.skills.items()
             if name not in TELLING_SKILLS
         }

@@ -200,7 +200,7 @@ class RuleGuard:
         goal, place = (self._around.get(name, name) for name in (drive.text, drive.place))
         return goal.casefold() != place.casefold()
 
-    def happened(self, event: Event) -> None:
+    def judge_result(self, event: Event) -> None:
         """Add a completed event to the history. Raise RuleViolationError if its result broke a rule."""
         if broken := self.add_event(event):
             raise broken[0]
@@ -225,11 +225,11 @@ class RuleGuard:
                 late.append(RuleViolationError(rule, event, "is broken by"))
         return late
 
-    def moved(self, start: Point, end: Point, holding: str) -> None:
+    def record_drive(self, start: Point, end: Point, holding: str) -> None:
         """Record which rooms a straight drive has entered. Raise RuleViolationError if that broke a rule."""
         if self.judges_poses:
             for event in self._entered(rooms_along(self._rooms, start, end), holding):
-                self.happened(event)
+                self.judge_result(event)
 
     def give_up(self, rules: Iterable[Rule], event: Event, objection: Objection, why: str) -> None:
         """Stop judging some rules. Raise RuleViolationError for the first of them that must always hold."""
@@ -238,7 +238,7 @@ class RuleGuard:
             if rule.when == "always":
                 raise RuleViolationError(rule, event, objection, why)
 
-    def at_end(self) -> RuleViolationError | None:
+    def find_first_unkept(self) -> RuleViolationError | None:
         """Return an error for the first rule that is broken if the mission ends now, or None."""
         return next(self.find_unkept(), None)
 
@@ -261,8 +261,8 @@ class RuleGuard:
             is_leg = event.kind == GOTO or GOTO not in kinds
             if event.destination is not None and is_leg and self.judges_poses:
                 for inside in self._entered(self._way(event.place, event.destination), named.holding):
-                    self.happened(inside)
-            self.happened(named)
+                    self.judge_result(inside)
+            self.judge_result(named)
 
     def _named(self, event: Event, request: str, thing: Thing | None = None) -> Event:
         """Return a robot's event with the names that rules compare."""

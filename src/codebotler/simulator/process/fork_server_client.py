@@ -132,7 +132,7 @@ class BatchServer(ForkServer):
         """Return the child that was forked in advance, or else a new one. No batch is live."""
         child, self._next = self._next, None
         if child is not None and self.has_ended:  # another process may have the child's id now
-            child.hang_up()
+            child.close_channel()
             child = None
         return child or super().fork(is_live=is_live)
 
@@ -145,7 +145,7 @@ class BatchServer(ForkServer):
         """Kill the fork server, and hang up on the child that was forked in advance."""
         super().close()
         if self._next is not None:
-            self._next.hang_up()
+            self._next.close_channel()
 
     def _set_up(self) -> None:
         """Specialize the bytecode. The heap need not be stable, since tame programs cannot observe it."""

@@ -24,7 +24,7 @@ from codebotler.simulator.process.spawn import start_module
 from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS
 from codebotler.simulator.sandbox.channel import receive, send_frames
 from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter
-from codebotler.simulator.sandbox.start import forget_the_shell
+from codebotler.simulator.sandbox.start import reset_inherited_settings
 
 MAX_RESULT = 64_000_000  # bytes of JSON
 RESULT, FAILURE = b"+", b"-"  # the first byte of an answer
@@ -118,7 +118,7 @@ class ClosedProcess:
             raise LostProcessError("the process did not answer in time") from None
         except ProtocolError as error:
             raise IsolatedCallError("MemoryError", f"the result is too large: {error}") from None
-        self._channel.reset_patience()
+        self._channel.restart_wait()
         if not answer:
             status = self._channel.end_gently()
             if status == -signal.SIGKILL:
@@ -157,7 +157,7 @@ def serve(module: str, descriptor: str) -> NoReturn:
     """Call functions of a module for the engine, until the engine closes the channel `descriptor`."""
     import unicodedata as _  # noqa: F401, PLC0415 - needed to parse "\N{...}", and cannot be imported later
 
-    forget_the_shell()
+    reset_inherited_settings()
     functions = {
         name: one for name, one in vars(import_module(module)).items() if isinstance(one, IsolatedFunction)
     }

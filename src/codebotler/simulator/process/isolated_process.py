@@ -37,7 +37,7 @@ class IsolatedProcess:
         for direction in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):  # one system call fewer than settimeout
             channel.setsockopt(socket.SOL_SOCKET, direction, silence)
         self._buffer = bytearray()
-        self.patience = PROCESS_WAIT_SECONDS  # seconds left to wait
+        self.wait_left = PROCESS_WAIT_SECONDS  # seconds left to wait
 
     @cached_property
     def pid(self) -> int:
@@ -45,7 +45,7 @@ class IsolatedProcess:
         try:
             return self._find_pid()
         except LostProcessError:
-            self.hang_up()
+            self.close_channel()
             raise
 
     def send(self, message: object) -> None:
@@ -61,7 +61,7 @@ class IsolatedProcess:
                 used = self._check_progress(used)
             except OSError:
                 return
-            self._be_patient(began)
+            self._use_wait(began)
 
     def receive(self) -> object:
         """Return the next JSON message, or None if the process has hung up.
@@ -102,11 +102,11 @@ class IsolatedProcess:
                 if not piece:
                     return None
                 self._buffer += piece
-            self._be_patient(began)
+            self._use_wait(began)
 
-    def _be_patient(self, since: float) -> None:
-        self.patience -= min(time.monotonic() - since, SILENCE_SECONDS)  # any more is a delay of our own
-        if self.patience < 0:
+    def _use_wait(self, since: float) -> None:
+        self.wait_left -= min(time.monotonic() - since, SILENCE_SECONDS)  # any more is a delay of our own
+        if self.wait_left < 0:
             raise TimeoutError
 
     def _check_progress(self, before: int | None) -> int | None:
@@ -128,7 +128,7 @@ class IsolatedProcess:
         try:
             return self._wait()
         finally:
-            self.hang_up()
+            self.close_channel()
 
     def end_gently(self) -> int:
         """Kill the process if it does not exit within 0.1 seconds. Return what `end` returns."""
@@ -138,11 +138,11 @@ class IsolatedProcess:
             time.sleep(0.002)
         return self.end()
 
-    def reset_patience(self) -> None:
+    def restart_wait(self) -> None:
         """Allow the full waiting time again, after an answer."""
-        self.patience = PROCESS_WAIT_SECONDS
+        self.wait_left = PROCESS_WAIT_SECONDS
 
-    def hang_up(self) -> None:
+    def close_channel(self) -> None:
         """Close the channel to the process."""
         self._channel.close()
 

@@ -44,7 +44,7 @@ class ProgramRun:
         self.skills: SkillDescriptions = ()
         self.kinds: dict[str, list[str]] = {}  # parameter kinds of each skill; `list` means options
         self.now = 0.0
-        self.spent = self.entered = False
+        self.has_reached_limit = self.entered = False
         self.refused_at: int | None = None  # the line where a rule ended the run
         self.codes: set[types.CodeType] = set()
         self.fuel = 0
@@ -77,14 +77,14 @@ class ProgramRun:
         except BaseException as error:  # noqa: BLE001 - any end of a program is an outcome
             setrecursionlimit(self.recursion_limit + HEADROOM)
             return self.ended_by(error)
-        return self.ended_by(LimitReachedError()) if self.spent else '{"end":"finished"}'
+        return self.ended_by(LimitReachedError()) if self.has_reached_limit else '{"end":"finished"}'
 
     def ended_by(self, error: BaseException) -> str:
         """Return the program's end as JSON, from the error that ended it, whose class may be its own."""
         kind, line = type(error), self.refused_at or _last_line(error)
         message = str.__getitem__(_message_of(error), slice(1000))  # a subclass of `str` may use fuel
         where = f'"line":{"null" if line is None else line}'
-        if self.spent or issubclass(kind, LimitReachedError):
+        if self.has_reached_limit or issubclass(kind, LimitReachedError):
             return f'{{"end":"timeout",{where}}}'
         if issubclass(kind, SystemExit):
             code = _own(SystemExit, "code", error)
@@ -106,7 +106,7 @@ class ProgramRun:
         use_fuel = self.fuel_counter()
         return {
             FUEL: use_fuel,
-            CAUGHT: self.catcher(use_fuel),
+            CAUGHT: self.except_hook(use_fuel),
             # Goes one call deeper than a skill before lifting the recursion limit, and so hits it first.
             ENTRY: lambda: use_fuel(),  # noqa: PLW0108 - see above
             ENTER: self.enter,
@@ -140,13 +140,13 @@ class ProgramRun:
         self.refuel()
 
         def use_fuel() -> None:
-            if self.count() > self.fuel or self.spent:
-                self.spent = True
+            if self.count() > self.fuel or self.has_reached_limit:
+                self.has_reached_limit = True
                 raise LimitReachedError
 
         return use_fuel
 
-    def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
+    def except_hook(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
         """Return the function to call at the start of each `except` and `finally`."""
         return use_fuel
 
@@ -183,7 +183,7 @@ class ProgramRun:
             given: type = type(value)
             if given is not kind:
                 _check_fit(name, parameter, value, given)
-        if self.spent:
+        if self.has_reached_limit:
             raise LimitReachedError
         arguments = [value.copy() if type(value) is list else value for value in values]
         result = self.carry_out(name, arguments)
@@ -220,7 +220,7 @@ class ProgramRun:
 
     def request(self, request: str) -> Any:  # noqa: ANN401 - a skill may return any type
         """Send one request to the engine. Return the value of its reply, or raise the error in it."""
-        if self.spent:
+        if self.has_reached_limit:
             raise LimitReachedError
         where = f",{_line_at_work()}" if self.is_live else ""
         send(f"[{request},{self.now!r}{where}]")
@@ -231,7 +231,7 @@ class ProgramRun:
             return value
         if kind == "error":
             raise robot_error(*value)
-        self.spent = True
+        self.has_reached_limit = True
         self.refused_at = (_line_at_work() or None) if value else None
         raise LimitReachedError
 

@@ -75,19 +75,19 @@ def _one_run(
 
     The dead child is reaped when the next run is requested, so that its process id is not reused earlier.
     """
-    line, is_live = _asked_for(door)
-    if line < 0:
+    descriptor, is_live = _asked_for(door)
+    if descriptor < 0:
         return False
     parent = getpid().to_bytes(PID_BYTES, "big")
     pid = os.fork()
     if pid == 0:
         try:
-            isolate(line, seccomp, LIVE_CPU_SECONDS if is_live else seconds, parent)
+            isolate(descriptor, seccomp, LIVE_CPU_SECONDS if is_live else seconds, parent)
             execute(run)
             os._exit(0)
         finally:
             os._exit(1)
-    os.close(line)
+    os.close(descriptor)
     _report(pid)
     _report(_end_of(pid))
     return True
@@ -115,9 +115,9 @@ def _end_of(pid: int) -> int:
     return ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
 
 
-def isolate(line: int, seccomp: Filter | None, seconds: int, parent: bytes) -> None:
-    """Isolate the forked child: make the socket `line` its channel, and apply the limits and seccomp."""
-    os.dup2(line, CHANNEL)
+def isolate(descriptor: int, seccomp: Filter | None, seconds: int, parent: bytes) -> None:
+    """Isolate the forked child: make a socket its channel, and apply the limits and seccomp."""
+    os.dup2(descriptor, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     die_with_parent()
     if getppid().to_bytes(PID_BYTES, "big") != parent:  # the parent has died already

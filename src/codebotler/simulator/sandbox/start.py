@@ -72,7 +72,7 @@ def start_again(descriptors: list[int]) -> NoReturn:
     """
     import ctypes  # noqa: PLC0415 - large, and not needed after the restart
 
-    forget_the_shell()
+    reset_inherited_settings()
     arrange(descriptors)
     if sys.platform == "linux":
         ctypes.CDLL(None).personality(ctypes.c_ulong(ADDR_NO_RANDOMIZE))
@@ -90,7 +90,7 @@ def arrange(descriptors: list[int]) -> None:
     os.closerange(end, 65536)
 
 
-def forget_the_shell() -> None:
+def reset_inherited_settings() -> None:
     """Reset the settings inherited from the shell: signal handling and the stack size."""
     import _signal  # type: ignore[import-not-found] # noqa: PLC0415 - not needed after the restart
     from resource import RLIMIT_STACK, getrlimit, setrlimit  # noqa: PLC0415 - see above

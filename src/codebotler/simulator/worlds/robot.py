@@ -35,7 +35,7 @@ class SkillGuard(Protocol):
     def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
         """Raise RobotError if an action inside one of the user's own skills is forbidden."""
 
-    def at_end(self) -> RobotError | None:
+    def find_first_unkept(self) -> RobotError | None:
         """Return an error if the run breaks a rule by ending now, or None if it breaks none."""
 
 
@@ -192,7 +192,7 @@ class SimulatedRobot(SimulatedWorld):
             self.fail(str(known))
         if known is not None:
             if not row.returns.fits(known):
-                must = f"{skill} must return {row.returns.words}"
+                must = f"{skill} must return {row.returns.in_words}"
                 raise UserError(f"the world sets {call} to {known!r}, but {must}")
             return plain(known)
         asks = [one for one, parameter in zip(arguments, row.parameters, strict=True) if parameter.is_options]

@@ -64,10 +64,10 @@ class ExploredRoom:
 class RoomSearch:
     """The rooms in which a program looked for a person or thing."""
 
-    vain: set[str] = field(default_factory=set)
-    found: set[str] = field(default_factory=set)
+    rooms_without: set[str] = field(default_factory=set)
+    rooms_with: set[str] = field(default_factory=set)
 
     @property
     def is_lost(self) -> bool:
         """Whether the program searched at least two rooms, and found the person or thing in none."""
-        return len(self.vain) > 1 and not self.found
+        return len(self.rooms_without) > 1 and not self.rooms_with

@@ -114,17 +114,17 @@ class SampledRobot(SimulatedRobot):
         for sought, search in self.searches.items():
             is_part = contains(name, sought) or contains(sought, name)
             if sought == name or (is_part and SOMEBODY not in {sought, name}):
-                combined.vain |= search.vain
-                combined.found |= search.found
+                combined.rooms_without |= search.rooms_without
+                combined.rooms_with |= search.rooms_with
         return combined
 
     @contextmanager
-    def excused(self, *, when: bool) -> Iterator[None]:
-        """Excuse the program for a RobotError raised in this context if `when` (in strict worlds, never)."""
+    def excuse_errors(self, *, is_excusable: bool) -> Iterator[None]:
+        """Excuse the program for a RobotError raised in this context, except in strict worlds."""
         try:
             yield
         except RobotError as error:
-            if when and not self.sampler.strict:
+            if is_excusable and not self.sampler.strict:
                 self.excuses.add(str(error))
             raise
 
@@ -168,7 +168,7 @@ class SampledRobot(SimulatedRobot):
         is_person = is_person or name == SOMEBODY
         goal = self._around if is_person else self.room
         explored, search = self.explored[goal], self.searches[name]
-        (search.found if is_there else search.vain).add(self.room)
+        (search.rooms_with if is_there else search.rooms_without).add(self.room)
         if not is_there:
             explored.people -= explored.people if name == SOMEBODY else {name}
             for place in self._reach.get(self.room, (self.room,)):
@@ -247,7 +247,7 @@ class SampledRobot(SimulatedRobot):
         else:
             found = self._find(name, is_person=means_person(entity))
         search = self.searches[name]
-        (search.found if found else search.vain).add(self.room)
+        (search.rooms_with if found else search.rooms_without).add(self.room)
         self.record(CHECK, entity, found=found)
         return found
 
@@ -347,7 +347,7 @@ class SampledRobot(SimulatedRobot):
         who = normalized(person)
         if not options or not self._answers(who):
             lost = self.search(who).is_lost or self.search(SOMEBODY).is_lost
-            with self.excused(when=bool(options) and lost):
+            with self.excuse_errors(is_excusable=bool(options) and lost):
                 return super().ask(person, question, options)
         self.record(ASK, question, options, to=person)
         asked = (self.room, who, question.strip())
@@ -377,8 +377,8 @@ class SampledRobot(SimulatedRobot):
         if self.held is None and self.is_here(name) is None and self._lies_there(name):
             self._add(name, self.room)
         search = self.search(name)
-        again = self.held is not None and normalized(self.held) == name and len(search.found) > 1
-        with self.excused(when=again or search.is_lost):
+        again = self.held is not None and normalized(self.held) == name and len(search.rooms_with) > 1
+        with self.excuse_errors(is_excusable=again or search.is_lost):
             super().take(obj)
         for goal in self._reach.get(self.room, (self.room,)):
             self.explored[goal].gone.add(name)
@@ -392,7 +392,7 @@ class SampledRobot(SimulatedRobot):
 
     def put(self, obj: str) -> None:
         """Put down the held object, as `SimulatedRobot.put` does."""
-        with self.excused(when=self.held is None and self.search(normalized(obj)).is_lost):
+        with self.excuse_errors(is_excusable=self.held is None and self.search(normalized(obj)).is_lost):
             super().put(obj)
 
 

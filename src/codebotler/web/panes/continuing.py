@@ -67,7 +67,7 @@ class ContinueButton(Button):
 
         with ui.dialog() as dialog, ui.card().classes("pane"):
             PlainText("h3", "Did this happen?")
-            PlainText("p", f"{capitalize(past.question)}.")
+            PlainText("p", f"{capitalize(past.unsure_step_text)}.")
             for sentence in evidence:
                 PlainText("p", sentence, "quiet")
             with ui.element("div").classes("word"):

@@ -18,7 +18,7 @@ def draw_contract(skills: SkillTable, contracts: tuple[Contract, Contract | None
     sentence = contract_sentence(contract, skills)
     PlainText("p", visible(sentence))
     if earlier is not None:
-        new, is_narrower = contract.beyond(earlier), bool(earlier.beyond(contract).skills)
+        new, is_narrower = contract.excess_over(earlier), bool(earlier.excess_over(contract).skills)
         same = "Less than the draft before." if is_narrower else "The same as the draft before."
         PlainText("p", "More than the draft before:" if new.skills else same)
         if new.skills:

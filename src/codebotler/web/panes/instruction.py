@@ -58,7 +58,7 @@ class InstructionPane:
             self._examples = DrawnBox("picks", partial(self._draw_picks, "Examples"))
             self._recent = DrawnBox("picks", partial(self._draw_picks, "Recent"))
         self._about_model()
-        self._error.say("")
+        self._error.show_text("")
 
     @property
     def model(self) -> str:
@@ -96,8 +96,8 @@ class InstructionPane:
             if view.model in self._console.models:
                 self._model.value = view.model
         self._write.allow(not view.is_written and not view.is_running)
-        self._write.say("Writing …" if view.is_written else "Write the program")
-        self._error.say(view.error if view.suggestions is None else self._unknown(view.suggestions))
+        self._write.show_text("Writing …" if view.is_written else "Write the program")
+        self._error.show_text(view.error if view.suggestions is None else self._unknown(view.suggestions))
         self._similar.show([(text, "") for text in view.suggestions or ()] or None)
 
     def _ask(self) -> None:

@@ -63,10 +63,10 @@ class _MissionList:
         try:
             self._known = await asyncio.to_thread(read_missions, self._console.home)
         except UserError as error:
-            self._error.say(str(error))
+            self._error.show_text(str(error))
             return
         self._seen = seen
-        self._error.say("")
+        self._error.show_text("")
         self._show()
 
     def _search(self) -> None:
@@ -79,7 +79,7 @@ class _MissionList:
         words = (self._text.value or "").casefold().split()
         view = self._console.view
         found = [one for one in reversed(self._known) if has_words(one, state_words(one, view), words)]
-        self._count.say(_count_text(len(found), len(self._known)))
+        self._count.show_text(_count_text(len(found), len(self._known)))
         found, rests = found[:MAX_LISTED_MISSIONS], rests_in(self._known)
         for gone in self._rows.keys() - {one.id for one in found}:
             self._rows.pop(gone).delete()

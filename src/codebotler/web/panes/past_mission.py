@@ -82,7 +82,7 @@ class _MissionPage:
                 _draw_event(line, words)
         self._count = len(steps)
         more = len(events) - MAX_LISTED_EVENTS
-        self._more.say(f"Download the events to see {more:,} more." if more > 0 else "")
+        self._more.show_text(f"Download the events to see {more:,} more." if more > 0 else "")
 
 
 def _draw_header(mission: tuple[MissionSummary, str, MissionSummary | None]) -> None:

@@ -93,15 +93,15 @@ class ProgramPane:
         self._view = view
         shown = _for_editor(view.arriving.code if view.is_written else view.program)
         self._send(view, shown)
-        self._origin.say(origin_text(view))
+        self._origin.show_text(origin_text(view))
         self._past.show(view.past)
         self._reply.show(view)
         self._candidates.show(view)
         self._editor.set_visibility(not view.waits_for_answer)
-        self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
-        self._writer.say(_author_text(view) if view.program and not view.is_written else "")
+        self._busy.show_text(f"{view.busy} …" if view.busy and not view.is_over else "")
+        self._writer.show_text(_author_text(view) if view.program and not view.is_written else "")
         self._show_verdict(view)
-        self._instruction.say(_instruction_text(view) if view.program else "")
+        self._instruction.show_text(_instruction_text(view) if view.program else "")
         self._contract.show(None if view.contract is None else (view.contract, view.earlier))
         self._rules.show(view)
         self._show_approval(view)
@@ -152,14 +152,14 @@ class ProgramPane:
     def _show_verdict(self, view: SessionView) -> None:
         count = len(view.problems)
         if view.check is None:
-            self._verdict.say("")
+            self._verdict.show_text("")
             return
         many = f"{count} problems" if count > 1 else "1 problem"
         self._verdict.classes(add="bad" if count else "good", remove="good" if count else "bad")
         verdict = f"{many}. The robot should not run this." if count else "Checked: no problems."
         if view.check.rooms_are_guessed:
             verdict += " The robot does not list its rooms; the check used the rooms named in the program."
-        self._verdict.say(f"{verdict} {view.check.assumption}".rstrip())
+        self._verdict.show_text(f"{verdict} {view.check.assumption}".rstrip())
 
     def _show_approval(self, view: SessionView) -> None:
         open_ = view.state is not None and view.state.is_open and not view.is_over and bool(view.program)
@@ -173,7 +173,7 @@ class ProgramPane:
         self._repair.set_visibility(may_again and (bool(view.problems) or can_repair))
         self._again_button.set_visibility(may_again)
         higher = none.higher_limit if none is not None and may_again else None
-        self._raise.say(f"Raise the limit to {higher:,} tokens" if higher else "")
+        self._raise.show_text(f"Raise the limit to {higher:,} tokens" if higher else "")
         self._run.set_visibility(open_ or self._may_rerun(view))
         again = "Prepare another run" if view.past is None else "Check this rest again"
         again = "Start again from the beginning" if is_unfinished(view) else again

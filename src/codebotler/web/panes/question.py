@@ -28,7 +28,7 @@ class QuestionPane:
         screens = self._face.screens
         shown = f"The robot's face is open on {counted(screens, 'screen')}."
         nobody = "" if is_over else "Open the robot's face so people can see what it says and asks."
-        self._screens.say(shown if screens else nobody)
+        self._screens.show_text(shown if screens else nobody)
         self._screens.classes(add="" if screens else "unsure", remove="unsure" if screens else "")
         self._box.show(self._face.shown.question)
 

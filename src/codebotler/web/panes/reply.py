@@ -29,9 +29,9 @@ class ReplyPane:
             why = none.sentence + (" The previous program is kept." if view.program else "")
             text = "" if none.sentence.endswith(none.text.strip()) else none.text  # do not quote it twice
             reasoning = "" if none.reasoning in none.text else none.reasoning
-        self._why.say(why)
-        self._text.say(text, is_arriving=view.is_written)
-        self._reasoning.say(reasoning)
+        self._why.show_text(why)
+        self._text.show_text(text, is_arriving=view.is_written)
+        self._reasoning.show_text(reasoning)
 
 
 class _Folded:
@@ -43,9 +43,9 @@ class _Folded:
             PlainText("summary", title)
             self._text = PlainText("div", "", "text").props("tabindex=0")
 
-    def say(self, text: str, *, is_arriving: bool = False) -> None:
+    def show_text(self, text: str, *, is_arriving: bool = False) -> None:
         """Show a string, or hide the element if the text is empty."""
         self._box.set_visibility(bool(text.strip()))
         if len(text) > _MAX_CHARACTERS:
             text = f"… {text[-_MAX_CHARACTERS:]}" if is_arriving else f"{text[:_MAX_CHARACTERS]} …"
-        self._text.say(text.strip())
+        self._text.show_text(text.strip())

@@ -60,18 +60,18 @@ class RobotPane:
         """Show the mission's state, the robot on its map, and what has happened so far."""
         self._interrupted.show(self._console.interrupted or None)
         progress = view.progress
-        self._state.say(_headline(view))
+        self._state.show_text(_headline(view))
         self._state.classes(replace=f"headline {view.phase or 'none'}")
         doing = progress.doing
-        self._doing.say(doing[:1].upper() + doing[1:] if view.is_running else "")
+        self._doing.show_text(doing[:1].upper() + doing[1:] if view.is_running else "")
         where = [f"line {progress.line}"] if progress.line is not None else []
         where += [f"holding {shortened(progress.held, 60)}"] if progress.held else []
         if progress.moments and progress.clock:
             where.append(f"{progress.clock:.1f} s on the robot's clock")
-        self._where.say(" · ".join(where))
-        self._reason.say(reason_text(view.reason, view.line))
+        self._where.show_text(" · ".join(where))
+        self._reason.show_text(reason_text(view.reason, view.line))
         lost = "" if view.is_over and view.progress.has_begun else self._console.warning  # else its reason
-        self._warning.say(lost)
+        self._warning.show_text(lost)
         self._continue.show(view)
         if self._asking is not None:
             self._asking.show(is_over=view.is_over)

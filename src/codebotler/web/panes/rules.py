@@ -42,7 +42,7 @@ class RulesPane:
                     with ui.element("div"):
                         PlainText("span", shortened(rule.says, _MAX_RULE_CHARACTERS))
                         if rule.name in proofs:
-                            PlainText("small", f"It {proofs[rule.name].words}.", "quiet")
+                            PlainText("small", f"It {proofs[rule.name].in_words}.", "quiet")
                     if is_off:
                         PlainText("small", "switched off for this program", "quiet")
                     elif may_be_approved:

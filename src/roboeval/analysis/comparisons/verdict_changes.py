@@ -63,9 +63,9 @@ def verdict_changes(name: str, first: Results, second: Results) -> VerdictChange
     programs = first.programs
     return VerdictChanges(
         name=name,
-        suites=(first.known_suite.name, second.known_suite.name),
+        suites=(first.required_suite.name, second.required_suite.name),
         comparison=compare_scores(_pass_at_1(first, second), _pass_at_1(second, first)),
-        tasks=tuple(_by_task(both, first.known_suite.tasks)),
+        tasks=tuple(_by_task(both, first.required_suite.tasks)),
         first_only=tuple(describe_groups(group_failures(map(second.row, lost), programs), second)),
         second_only=tuple(describe_groups(group_failures(map(first.row, won), programs), first)),
         programs=len({(key[0], programs[key]) for key in lost + won}),

@@ -46,7 +46,7 @@ class EvaluationSummary:
     @property
     def judged(self) -> int:
         """The number of judged completions."""
-        return sum(task.n for task in self.tasks)
+        return sum(task.completions for task in self.tasks)
 
     @property
     def coverage(self) -> Coverage:
@@ -64,7 +64,7 @@ def summarise(
     try:
         estimates = tuple(overall(tasks, tries) for tries in k)
     except ValueError as error:
-        fewest = min(prompt.n for prompt in prompts_of(tasks))
+        fewest = min(prompt.completions for prompt in prompts_of(tasks))
         raise UserError(f"{error}; choose k from 1 to {fewest}") from None
     scored = {score.task for score in tasks}
     expected = [n for n, task in suite.tasks.items() if task.ablation is not None or not ablated]
@@ -133,7 +133,7 @@ def summary_data(summary: EvaluationSummary) -> dict[str, Any]:
         "max_tokens": summary.scope.limit,
         **({"endings": dict(ends), "turns": summary.scope.turns} if (ends := summary.scope.endings) else {}),
         "completions": summary.judged,
-        "passed": sum(task.c for task in summary.tasks),
+        "passed": sum(task.passed for task in summary.tasks),
         **{f"pass@{k}": asdict(estimate) for k, estimate in zip(summary.k, summary.overall, strict=True)},
         "tasks": [_task_score_data(task, summary) for task in summary.tasks],
         "failures": [
@@ -154,12 +154,12 @@ def _task_score_data(task: TaskScore, summary: EvaluationSummary) -> dict[str, A
         {"prompt": prompt.prompt, **_counts(prompt), **{f"pass@{k}": prompt.pass_at(k) for k in ks}}
         for prompt in task.prompts
     ]
-    requested = summary.scope.coverage(task.n, task.task).requested
+    requested = summary.scope.coverage(task.completions, task.task).requested
     return {"task": task.task, **_counts(task), "requested": requested, **spreads, "prompts": prompts}
 
 
 def _counts(score: TaskScore | PromptScore) -> dict[str, int]:
-    return {"completions": score.n, "passed": score.c}
+    return {"completions": score.completions, "passed": score.passed}
 
 
 def _failure_data(failures: Failures, what: str) -> dict[str, Any]:

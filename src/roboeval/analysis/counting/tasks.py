@@ -63,9 +63,9 @@ def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
         "instructions": _distinct(written, "instruction"),
         "suite_instruction": suite_instruction(results.suite, task, prompt),
         "models": _distinct(written, "model"),
-        "completions": score.n,
+        "completions": score.completions,
         "requested": None if requested is None else requested.get(task, 0) // len(prompts),
-        "passed": score.c,
+        "passed": score.passed,
         "pass@1": score.pass_at(1),
     }
 

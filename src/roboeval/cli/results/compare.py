@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboeval.cli.engine_choice import engine_named
-from roboeval.cli.inputs import expect_same_suite, open_current
+from roboeval.cli.inputs import expect_same_suite, open_with_results
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
@@ -76,7 +76,7 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
     )
     from roboeval.cli.views.comparison import comparison_view
 
-    opened = [open_current(path, suite, ablated=ablated) for path in paths]
+    opened = [open_with_results(path, suite, ablated=ablated) for path in paths]
     expect_same_suite(opened, suite)
     tables = comparable_tables(*(one.table for one in opened))
     result = compare_tables(*(one.table for one in opened))
@@ -106,8 +106,8 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
         fail(f'--suites takes two suites separated by a comma, such as paper,plus, not "{suites}"')
     found = []
     for path in paths:
-        first = open_current(path, names[0], ablated=ablated)
-        second = open_current(path, names[1], ablated=ablated, reuse_from=first)
+        first = open_with_results(path, names[0], ablated=ablated)
+        second = open_with_results(path, names[1], ablated=ablated, reuse_from=first)
         found.append(verdict_changes(str(path), first, second))
     for one in found:
         if one.left_out:
@@ -140,7 +140,7 @@ def resample(
     from roboeval.cli.views.groups import resample_view
 
     with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
-        results = open_current(run, suite, ablated=False, rules=rules)
+        results = open_with_results(run, suite, ablated=False, rules=rules)
         if has_missions(results.table):
             fail(f"{run}: contains missions of an agent, which cannot be checked; name a run of programs")
         checker = engine_for(len(results.places))
@@ -159,8 +159,8 @@ def check_run(results: Results, engine: OpenEngine) -> pl.DataFrame:
     from roboeval.evaluation.runs.table import with_answers
 
     completions = [results.completions[key] for key in results.places]
-    judged = [one for one in completions if one.acted is None]  # an agent's mission holds in one world only
-    problems = check_completions(results.run, results.known_suite, judged, engine)
+    judged = [one for one in completions if one.mission is None]  # an agent's mission holds in one world only
+    problems = check_completions(results.run, results.required_suite, judged, engine)
     return with_answers(results.table, problems)
 
 

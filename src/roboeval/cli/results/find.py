@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from codebotler.core.errors import UserError
-from roboeval.cli.inputs import open_current
+from roboeval.cli.inputs import open_with_results
 from roboeval.cli.options import AblationOption, JsonOption, RunArgument, SuiteOption
 from roboeval.cli.output import fail, note, print_json, print_rich, show_progress
 
@@ -41,17 +41,17 @@ def find(
     the reason.
     """
     from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures
-    from roboeval.analysis.search import TraceQuery, match_row
+    from roboeval.analysis.search import TraceQuery, search_row
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
 
     if negated and formula is None:
         fail("--not needs a formula; add one, or leave out --not")
     parsed = None if formula is None else parse_formula(formula)
-    results = open_current(run, suite, ablated=ablation)
-    task = None if task is None else results.known_suite.task(task).name
+    results = open_with_results(run, suite, ablated=ablation)
+    task = None if task is None else results.required_suite.task(task).name
     query = TraceQuery(parsed, negated, task, world)
-    matches = (match_row(results.row(key), query) for key in results.places)
+    matches = (search_row(results.row(key), query) for key in results.places)
     every = list(show_progress(matches, "searching", len(results.places)))
     total = sum(one.is_in_scope for one in every)
     if world is not None and not total:

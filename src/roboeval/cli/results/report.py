@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.inputs import command, expect_same_suite, open_current
+from roboeval.cli.inputs import command, expect_same_suite, open_with_results
 from roboeval.cli.options import HouseRulesOption, SuiteOption, WorkersOption, path_to
 from roboeval.cli.output import fail, note, show_progress
 from roboeval.cli.results.compare import check_run
@@ -61,13 +61,13 @@ def report(
     from codebotler.simulator.pool import cores
     from roboeval.evaluation.engines.engine import Local
     from roboeval.report.runs import name_runs, price_runs, read_labels, read_prices
-    from roboeval.report.writing import expect_no_others, headline, pieces, sections, write_report
+    from roboeval.report.writing import count_parts, expect_no_others, headline, sections, write_report
 
     expect_no_others(out)
     prices, labels = read_prices(price or ()), read_labels(label or (), runs)
     if beside == suite:
         fail(f'--beside names "{suite}", which the report itself uses; name a different suite')
-    opened = [open_current(run, suite, ablated=False) for run in runs]
+    opened = [open_with_results(run, suite, ablated=False) for run in runs]
     expect_same_suite(opened, suite)
     engine = Local(workers or cores()) if check else None
     read = [judged_run(one, suite, beside=beside, rules=rules, engine=engine) for one in opened]
@@ -81,7 +81,7 @@ def report(
     again = command("report", *runs, *options, suite=suite)
     with busy("assembling the report"):
         parts = sections(read, with_published=published, command=again)
-    for _ in show_progress(write_report(*headline(read), parts, out), "writing", pieces(parts)):
+    for _ in show_progress(write_report(*headline(read), parts, out), "writing", count_parts(parts)):
         pass
     note(f"the report is in {out / 'index.html'}")
 
@@ -100,14 +100,14 @@ def judged_run(
 
     run = results.run
     ablated = other = house = None
-    if run.rows(evaluation_key(results.known_suite, ablated=True)).is_file():
-        ablated = open_current(run.path, suite, ablated=True, reuse_from=results)
+    if run.rows(evaluation_key(results.required_suite, ablated=True)).is_file():
+        ablated = open_with_results(run.path, suite, ablated=True, reuse_from=results)
     if engine is None:
         table = results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))
     else:
         table = check_run(results, engine)
     if beside is not None:
-        other = open_current(run.path, beside, ablated=False, reuse_from=results)
+        other = open_with_results(run.path, beside, ablated=False, reuse_from=results)
     if rules is not None:
-        house = open_current(run.path, suite, ablated=False, rules=rules, reuse_from=results)
+        house = open_with_results(run.path, suite, ablated=False, rules=rules, reuse_from=results)
     return JudgedRun(results, table, ablated=ablated, other_suite=other, house=house)

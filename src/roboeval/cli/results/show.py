@@ -18,12 +18,12 @@ from codebotler.cli.options import (
 from codebotler.core.errors import UserError
 from roboeval.cli.inputs import (
     expect_judged,
-    find_gap,
-    load,
+    load_suite_option,
     names_completion,
-    open_current,
     open_run,
+    open_with_results,
     parse_selection,
+    unjudged_sentence,
 )
 from roboeval.cli.options import (
     AblationOption,
@@ -77,18 +77,18 @@ def show(
     if not what:
         show_run(judged, k or [], title=str(run), has_rules=rules is not None, as_json=json)
     else:
-        part = task, *numbers = parse_selection(what, judged.known_suite)
+        part = task, *numbers = parse_selection(what, judged.required_suite)
         expect_judged(part, judged.places)
         if is_one:
             key = task, numbers[0], numbers[1]
             show_completion(judged, key, in_full=in_full, with_reply=with_reply, as_json=json)
         else:
             show_part(judged, task, numbers[0] if numbers else None, as_json=json)
-    if not is_one and (unjudged := find_gap(judged, suite, rules)) is not None:
+    if not is_one and (unjudged := unjudged_sentence(judged, suite, rules)) is not None:
         note(unjudged)
 
 
-def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
+def broken_rules_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
     """Count broken house rules in a table, and compare pass@1 with the run's evaluation without rules."""
     from roboeval.analysis.counting.broken_rules import count_broken_rules
     from roboeval.evaluation.runs.folder import evaluation_key
@@ -101,11 +101,7 @@ def house_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: 
 
 
 def print_summary(
-    counted: EvaluationSummary,
-    *,
-    title: str,
-    as_json: bool,
-    house: BrokenRules | None = None,
+    counted: EvaluationSummary, *, title: str, as_json: bool, house: BrokenRules | None = None
 ) -> None:
     """Print the tables of an evaluation under a title, or print its data as JSON."""
     from roboeval.analysis.counting.summary import summary_data
@@ -129,9 +125,9 @@ def show_run(results: Results, k: list[int], *, title: str, has_rules: bool, as_
     from roboeval.analysis.counting.counts import tally_of
     from roboeval.analysis.counting.summary import summarise
 
-    ablated, suite = results.is_ablated, results.known_suite
+    ablated, suite = results.is_ablated, results.required_suite
     counted = summarise(tally_of(results.table), suite, results.scope, k=sorted({1, *k}), ablated=ablated)
-    house = house_of(results.run, suite, results.table, ablated=ablated) if has_rules else None
+    house = broken_rules_of(results.run, suite, results.table, ablated=ablated) if has_rules else None
     print_summary(counted, title=title, as_json=as_json, house=house)
 
 
@@ -180,11 +176,11 @@ def export(
 ) -> None:
     """Write a run's verdicts to a file as one flat table."""
     from codebotler.core.files import expect_replaceable
-    from roboeval.evaluation.runs.table import TABLE_BEGINNINGS, Price, kind_of, with_cost, write_table
+    from roboeval.evaluation.runs.table import TABLE_BEGINNINGS, Price, table_format, with_cost, write_table
 
-    kind = format or kind_of(out)
+    kind = format or table_format(out)
     cost = None if price is None else Price.read(price)
-    results = open_current(run, suite, ablated=ablation)
+    results = open_with_results(run, suite, ablated=ablation)
     table = results.table if cost is None else with_cost(results.table, cost)
     path = out or results.run.rows(str(results.key)).with_suffix(f".{kind}")
     expect_replaceable(path, *TABLE_BEGINNINGS)
@@ -219,7 +215,7 @@ def serve(
     access = Access.from_options(token, None, open_to_all=no_token, is_private=place.is_private)
     if not runs.is_dir():
         raise UserError("the folder does not exist; `roboeval run` creates it with the first run", file=runs)
-    suites = [load(each) for each in suite or ()]
+    suites = [load_suite_option(each) for each in suite or ()]
     if not RunStore(runs).names():
         note(f"{runs} contains no runs yet; new runs will appear on the page")
     server.serve(None, place, access, (pages(suites),), runs)

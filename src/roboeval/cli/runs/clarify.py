@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from codebotler.core.text.words import counted
-from roboeval.cli.inputs import load
+from roboeval.cli.inputs import load_suite_option
 from roboeval.cli.options import HouseRulesOption, JsonOption, SourceArgument, SuiteOption, WorkersOption
 from roboeval.cli.output import note, print_json, print_rich, show_progress
 
@@ -49,7 +49,7 @@ def clarify(
     from roboeval.evaluation.runs.folder import with_judged_worlds
     from roboeval.evaluation.runs.source import open_source
 
-    known = load(suite, rules)
+    known = load_suite_option(suite, rules)
     opened = open_source(source, known)
     completions = opened.of(None)
     if opened.run is not None:

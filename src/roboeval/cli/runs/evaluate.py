@@ -11,7 +11,7 @@ import typer
 from codebotler.cli.options import SkillsOption
 from codebotler.core.errors import installed
 from roboeval.cli.engine_choice import engine_named
-from roboeval.cli.inputs import command, load
+from roboeval.cli.inputs import command, load_suite_option
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
@@ -27,7 +27,7 @@ from roboeval.cli.options import (
     path_to,
 )
 from roboeval.cli.output import fail, note, progress_meter, show_progress, stoppable
-from roboeval.cli.results.show import house_of, print_summary
+from roboeval.cli.results.show import broken_rules_of, print_summary
 
 if TYPE_CHECKING:
     from roboeval.analysis.counting.summary import EvaluationSummary
@@ -77,7 +77,7 @@ def evaluate(
         from roboeval.evaluation.runs.scope import JudgingScope
         from roboeval.evaluation.runs.source import open_source
 
-        judged_by = load(suite, rules, skills)
+        judged_by = load_suite_option(suite, rules, skills)
         if worlds is not None or seed is not None:
             judged_by = judged_by.with_worlds(worlds, seed)
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
@@ -97,7 +97,7 @@ def evaluate(
             if scope.total == 0:
                 fail(f"{source}: contains no completion of {tasks or 'a task to judge'}; name another source")
             if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
-                run.keep(opened.completions)
+                run.import_completions(opened.completions)
             running = engine_for(scope.total)
             rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
             for row in show_progress(rows, "judging", scope.total):
@@ -106,7 +106,8 @@ def evaluate(
                 if table is not None:
                     table.add(row)
             counted = summarise(tally, judged_by, scope, ablated=ablation)
-            house = None if table is None else house_of(run, judged_by, table.table(), ablated=ablation)
+            found = None if table is None else table.table()
+            house = None if found is None else broken_rules_of(run, judged_by, found, ablated=ablation)
             print_summary(counted, title=source, as_json=json, house=house)
         _name_next_command(run, failed, suite=suite, ablated=ablation, rules=rules)
         _expect_all_judged(counted, scope.total)
@@ -173,13 +174,13 @@ def import_(
     """
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import RunFolder
-    from roboeval.evaluation.runs.source import is_answers, open_source
+    from roboeval.evaluation.runs.source import is_batch_file, open_source
 
-    if is_answers(Path(path)):
+    if is_batch_file(Path(path)):
         import_batch(Path(path), out, suite)
         return
-    completions = open_source(path, load(suite)).completions
-    RunFolder(out).keep(completions)
+    completions = open_source(path, load_suite_option(suite)).completions
+    RunFolder(out).import_completions(completions)
     again = command("evaluate", out, suite=suite)
     note(f"{out} has {how_many(len(completions))}; `{again}` judges them")
 
@@ -194,7 +195,8 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
     with path.open("rb") as file:
         count = sum(1 for _ in file)
     with progress_meter("reading", count) as update:
-        found = import_answers(RunFolder(out), load(suite), path, progress=lambda done: update(done, ""))
+        run, read = RunFolder(out), load_suite_option(suite)
+        found = import_answers(run, read, path, progress=lambda done: update(done, ""))
     there, again = found.total - found.missing, command("evaluate", out, suite=suite)
     note(
         f"{there:,} of {how_many(found.total)} are in {out}, {found.new:,} of them new; `{again}` judges them"

@@ -17,7 +17,7 @@ from codebotler.cli.options import BaseUrlOption, ModelOption, WithinOption, rea
 from codebotler.core.errors import install_command, installed
 from codebotler.core.text.words import counted
 from roboeval.cli.engine_choice import engine_named
-from roboeval.cli.inputs import command, load
+from roboeval.cli.inputs import command, load_suite_option
 from roboeval.cli.options import (
     ConcurrencyOption,
     IsolationOption,
@@ -118,7 +118,7 @@ def read_options(
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> GenerationRequest:
     """Read the options that `generate` and `run` share. Exit with status 2 if they do not fit together."""
-    from codebotler.models.open import NOT_CALLING, choose_model, kind_of
+    from codebotler.models.open import KINDS_WITHOUT_TOOLS, choose_model, kind_of
     from roboeval.evaluation.agents.conversation import TurnLimits
     from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan
     from roboeval.evaluation.generating.generate import Pace
@@ -128,7 +128,7 @@ def read_options(
     chosen = choose_model(model, base_url)
     settings = chosen.add_server(model_settings(**sampling))
     pace = Pace(concurrency, requests_per_minute, token_budget)
-    known = load(suite)
+    known = load_suite_option(suite)
     selected = tasks_to_judge(known, tasks, ablated=False)[0]
     plan = GenerationPlan(known, selected, num_completions or 50)
     if mode != "program":
@@ -139,7 +139,7 @@ def read_options(
         fail("--max-turns, --max-mission-tokens and --within need --mode agent or --mode replan; add one")
     if mode == "replan" and kind_of(chosen.name) == "recorded":
         fail(f"{chosen.name} cannot continue a failed mission; for --mode replan, name a language model")
-    if mode == "agent" and kind_of(chosen.name) in NOT_CALLING:
+    if mode == "agent" and kind_of(chosen.name) in KINDS_WITHOUT_TOOLS:
         fail(f"{chosen.name} cannot call tools; --mode agent needs a chat model, such as openai-chat:NAME")
     return GenerationRequest(chosen.name, settings, plan, pace, suite, out)
 

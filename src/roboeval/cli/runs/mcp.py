@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from codebotler.core.errors import installed
-from roboeval.cli.inputs import command, load
+from roboeval.cli.inputs import command, load_suite_option
 from roboeval.cli.options import SuiteOption, TasksOption, TurnsOption, path_to
 from roboeval.cli.output import fail, note
 
@@ -41,7 +41,7 @@ def mcp(
 
     if sys.stdin.isatty():
         fail("this command only works if an MCP client starts it; the guide shows the client's configuration")
-    known = load(suite)
+    known = load_suite_option(suite)
     selected = tasks_to_judge(known, tasks, ablated=False)[0]
     limits = TurnLimits(max_turns or DEFAULT_TURNS["agent"])
     plan = AgentPlan(known, selected, num_completions, mode="agent", limits=limits)

@@ -11,7 +11,7 @@ import typer
 
 from codebotler.cli.model_options import inherit_options, model_settings, note_unsent
 from codebotler.cli.options import BaseUrlOption, ModelOption
-from roboeval.cli.inputs import load
+from roboeval.cli.inputs import load_suite_option
 from roboeval.cli.options import ConcurrencyOption, JsonOption, SuiteOption, TasksOption
 from roboeval.cli.output import fail, print_json, print_rich, progress_meter, show_progress
 
@@ -53,9 +53,9 @@ def recover(
     from roboeval.evaluation.runs.folder import tasks_to_judge
     from roboeval.evaluation.runs.source import open_source, recorded_model_for
 
-    known, chosen = load(suite), choose_model(model, base_url)
+    known, chosen = load_suite_option(suite), choose_model(model, base_url)
     completions = open_source(source, known).of(tasks_to_judge(known, tasks, ablated=False)[0])
-    if any(one.acted is not None for one in completions):
+    if any(one.mission is not None for one in completions):
         fail(f"{source}: contains missions of an agent; name a run of programs")
     settings = chosen.add_server(model_settings(**sampling))
     is_own = is_recorded(chosen.name) and settings.base_url is None

@@ -74,7 +74,7 @@ def _task_table(summary: EvaluationSummary) -> Table:
     for task in summary.tasks:
         ends = task.lowest(summary.k[0]), task.highest(summary.k[0])
         shares = (*(task.pass_at(k).mean for k in summary.k), *ends)
-        coverage = summary.scope.coverage(task.n, task.task)
+        coverage = summary.scope.coverage(task.completions, task.task)
         of = "" if coverage.is_whole else f" of {coverage.total:,}"
         cells = (Text(f"{share:.2f}", styles.get(share, "")) for share in shares)
         table.add_row(Text(visible(task.task)), f"{coverage.judged:,}{of}", *cells)

@@ -131,7 +131,7 @@ def _row(
     reply = model.reply(plan.prompt(key), number=plan.sample(key), status=status, body=body)
     row = row_for(key, plan.instruction(key), model.name, reply.data())
     if (size := len(to_line(row))) > MAX_ROW:
-        raise ModelError(f"the reply is too long to save: {size:,} bytes", may_pass=False)
+        raise ModelError(f"the reply is too long to save: {size:,} bytes", is_temporary=False)
     return row
 
 

@@ -74,7 +74,7 @@ def generate_run(
             log = RequestLog(run.in_flight, done)
             metadata["possibly_paid_twice"] += log.interrupted
             write_whole(run.about, to_text(metadata))
-            for completion in plan.given():
+            for completion in plan.copied_completions():
                 if completion.key not in done:
                     file.append(to_line(completion.row))
             total = len(plan.keys())
@@ -180,7 +180,7 @@ class _Generation:
     async def _keep(self, key: CompletionKey, row: dict[str, Any]) -> None:
         line = to_line(row)
         if len(line) > MAX_ROW:
-            raise ModelError(f"the reply is too long to save: {len(line):,} bytes", may_pass=True)
+            raise ModelError(f"the reply is too long to save: {len(line):,} bytes", is_temporary=True)
         self.file.append(line)
         if self.turns is None:
             self.log.kept(key)

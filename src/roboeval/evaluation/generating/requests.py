@@ -60,7 +60,7 @@ class GenerationPlan:
         """Return the number of a completion's sample. The random seed of the request depends on it."""
         return key[2]
 
-    def given(self) -> Iterable[Completion]:
+    def copied_completions(self) -> Iterable[Completion]:
         """Return the completions to copy instead of requesting them. A run without rounds has none."""
         return ()
 
@@ -115,7 +115,7 @@ class RoundPlan(GenerationPlan):
         """Return the number of a completion's sample. It differs between rounds, as do the random seeds."""
         return key[2] + self.number * SAMPLE_STRIDE
 
-    def given(self) -> Iterator[Completion]:
+    def copied_completions(self) -> Iterator[Completion]:
         """Return the completions to copy: those of the previous round that the program check accepted."""
         return (one for key, one in self.earlier.items() if key not in self.problems)
 
@@ -132,7 +132,7 @@ def begin_batch(
     Raises UserError if existing completions have other settings.
     """
     about, done = _run_metadata(run, plan, model, settings), {one.key for one in plan.completed(run)}
-    there = done | {one.key for one in plan.given()}
+    there = done | {one.key for one in plan.copied_completions()}
     todo = [key for key in plan.keys() if key not in there]  # noqa: SIM118 - a plan is no mapping
     if todo:
         about["batches"] = _with_batch(about["batches"], plan, settings)

@@ -22,7 +22,7 @@ from roboeval.evaluation.engines.engine import Local, OpenEngine, Work
 from roboeval.evaluation.judging.failures import Verdict
 from roboeval.evaluation.judging.serialization import add_reply_fault, judgements_for, row_line
 from roboeval.evaluation.judging.time_limit import TimeLimitExceeded, time_limit
-from roboeval.evaluation.runs.completions import Acted, Completion, find_key_fault, name_of
+from roboeval.evaluation.runs.completions import Completion, MissionEnd, find_key_fault, name_of
 from roboeval.evaluation.runs.endings import apply_ending
 from roboeval.evaluation.runs.rows import Row
 from roboeval.suites.load import Requirement, Scenario, Suite
@@ -109,8 +109,8 @@ def judgements(
         for completion in completions:
             _expect_judgeable(completion, suite, ablated=ablated)
             waiting.append(completion)
-            acted = completion.acted
-            where = () if acted is None else (str(acted.world), acted.ending)
+            mission = completion.mission
+            where = () if mission is None else (str(mission.world), mission.ending)
             yield completion.task, completion.program, *where
 
     with engine as opened:
@@ -140,8 +140,8 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
     if ablated and suite.tasks[completion.task].ablation is None:
         raise UserError(f'the task "{completion.task}" has no ablation; select other tasks')
     worlds = suite.tasks[completion.task].judged_in(ablated=ablated)
-    if completion.acted is not None and (ablated or completion.acted.world >= len(worlds)):
-        unknown = f"took place in world {completion.acted.world}, which the task does not have"
+    if completion.mission is not None and (ablated or completion.mission.world >= len(worlds)):
+        unknown = f"took place in world {completion.mission.world}, which the task does not have"
         what = "cannot be judged in an ablation" if ablated else unknown
         raise UserError(f"the agent's mission {name_of(completion.key)} {what}; leave the mission out")
 
@@ -150,31 +150,31 @@ class Ran(NamedTuple):
     """The outcomes of a program, one for each world in which it is judged."""
 
     task: str
-    acted: Acted | None  # the world of an agent's mission; None for a program, which is judged in all worlds
+    mission: MissionEnd | None  # of an agent; None for a program, which is judged in all worlds
     outcomes: Sequence[Outcome]
 
 
-def _scenarios(suite: Suite, task: str, acted: Acted | None, *, ablated: bool) -> tuple[Scenario, ...]:
+def _scenarios(suite: Suite, task: str, mission: MissionEnd | None, *, ablated: bool) -> tuple[Scenario, ...]:
     """Return the worlds in which a program is judged, with their requirements."""
     scenarios = suite.tasks[task].judged_in(ablated=ablated)
-    return scenarios if acted is None else scenarios[acted.world :][:1]
+    return scenarios if mission is None else scenarios[mission.world :][:1]
 
 
 def run_in_worlds(suite: Suite, worker: Worker, works: Sequence[Work], *, ablated: bool) -> list[Ran]:
     """Run each program in all worlds of its task, and each mission of an agent only in its own world."""
     planned = [
-        (task, program, Acted(int(where[0]), where[1]) if where else None) for task, program, *where in works
+        (task, program, MissionEnd(int(end[0]), end[1]) if end else None) for task, program, *end in works
     ]
     jobs = [
         (
             program,
-            [partial(robot_in, one.world, suite) for one in _scenarios(suite, task, acted, ablated=ablated)],
+            [partial(robot_in, one.world, suite) for one in _scenarios(suite, task, end, ablated=ablated)],
         )
-        for task, program, acted in planned
+        for task, program, end in planned
     ]
     return [
-        Ran(task, acted, outcomes if acted is None else [apply_ending(one, acted.ending) for one in outcomes])
-        for (task, _, acted), outcomes in zip(planned, worker.run_all(jobs), strict=True)
+        Ran(task, end, outcomes if end is None else [apply_ending(one, end.ending) for one in outcomes])
+        for (task, _, end), outcomes in zip(planned, worker.run_all(jobs), strict=True)
     ]
 
 
@@ -198,7 +198,7 @@ def run_in(worker: Worker, program: str, scenarios: Iterable[Scenario], suite: S
 
 def judge_outcomes(suite: Suite, ran: Ran, *, ablated: bool) -> tuple[bytes, ...] | None:
     """Return the judgement on a program for each prompt, as JSON, or None if judging takes too long."""
-    outcomes, scenarios = ran.outcomes, _scenarios(suite, ran.task, ran.acted, ablated=ablated)
+    outcomes, scenarios = ran.outcomes, _scenarios(suite, ran.task, ran.mission, ablated=ablated)
 
     def compute() -> tuple[bytes, ...]:
         with time_limit(BUDGET):

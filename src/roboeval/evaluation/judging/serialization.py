@@ -37,7 +37,7 @@ def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
         return judgement_json
     kind: str | None = completion.no_program
     name = NO_PROGRAM_CLASS
-    if completion.acted is not None and completion.acted.ending == NO_CALL:
+    if completion.mission is not None and completion.mission.ending == NO_CALL:
         name, kind = AGENT_ERROR_CLASS, NO_CALL
     if kind is None:
         return judgement_json
@@ -53,7 +53,7 @@ def row_line(completion: Completion, judgement_json: bytes) -> bytes:
         "prompt": completion.prompt,
         "index": completion.index,
         "program_sha256": completion.program_sha256,
-        **({} if completion.acted is None else {"mission_world": completion.acted.world}),
+        **({} if completion.mission is None else {"mission_world": completion.mission.world}),
     }
     return b"%b, %b\n" % (to_line(identity).removesuffix(b"}\n"), judgement_json.removeprefix(b"{"))
 

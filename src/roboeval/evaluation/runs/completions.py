@@ -28,7 +28,7 @@ FIELDS = (*REQUIRED, "instruction", "model")
 NO_PROGRAM_COLUMN = "no_program"  # the table column for replies without a program
 
 
-class Acted(NamedTuple):
+class MissionEnd(NamedTuple):
     """The only world in which an agent carried out a mission, and how the mission ended."""
 
     world: int  # the index of the world in its task
@@ -70,7 +70,7 @@ class Completion:
             text = getattr(self, name)
             if not isinstance(text, str) and (text is not None or name in REQUIRED):
                 raise UserError(f"the {name} is {text!r}, but it must be a string")
-        if "world" in self.more and self.acted is None:
+        if "world" in self.more and self.mission is None:
             raise UserError(f'a mission needs a "world" from 0 and an "ending": {", ".join(ENDINGS)}')
         if (kind := self.more.get(NO_PROGRAM_COLUMN)) not in (None, *NO_PROGRAM_KINDS):
             raise UserError(
@@ -110,11 +110,11 @@ class Completion:
         return is_cut_off(self.finish_reason) or self.more.get(NO_PROGRAM_COLUMN) == "cut-off"
 
     @property
-    def acted(self) -> Acted | None:
+    def mission(self) -> MissionEnd | None:
         """Return the world and the ending of an agent's mission, or None if the model wrote a program."""
         world, ending = self.more.get("world"), self.more.get("ending")
         is_valid = type(world) is int and 0 <= world < NUMBER_LIMIT and ending in ENDINGS
-        return Acted(world, ending) if is_valid else None  # type: ignore[arg-type]  # `is_valid` has checked them
+        return MissionEnd(world, ending) if is_valid else None  # type: ignore[arg-type]  # `is_valid` has checked them
 
     @property
     def mode(self) -> str:

@@ -133,7 +133,7 @@ class RunFolder:
                 file=self.path,
             )
 
-    def keep(self, completions: Sequence[Completion]) -> None:
+    def import_completions(self, completions: Sequence[Completion]) -> None:
         """Copy completions into this run. Raise UserError, and change nothing, if it has different ones."""
         models = {completion.model for completion in completions}
         with self.writing():

@@ -31,7 +31,7 @@ def reply_data(completion: Completion) -> dict[str, Any] | None:
         "cut_off": completion.is_cut_off,
         **reply_numbers(completion),
         **{name: text if isinstance(text := more.get(name), str) else None for name in REPLY_TEXTS},
-        **({} if completion.acted is None else {**entries, "turns": completion.turns}),
+        **({} if completion.mission is None else {**entries, "turns": completion.turns}),
     }
 
 

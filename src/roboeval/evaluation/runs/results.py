@@ -89,7 +89,7 @@ class Results:
         return keys_where(self.table, ~pl.col("passed"))
 
     @property
-    def known_suite(self) -> Suite:
+    def required_suite(self) -> Suite:
         """The suite that judged the run. It must have been given when the results were read."""
         assert self.suite is not None, "only web pages show runs without their suite"
         return self.suite

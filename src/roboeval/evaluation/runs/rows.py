@@ -30,7 +30,7 @@ Failure = TypedDict("Failure", {"class": str, "kind": str, "world": int, "check"
 """
 
 
-class ErrorOfRun(TypedDict):
+class RunErrorData(TypedDict):
     """The error that ended a run."""
 
     kind: str
@@ -57,7 +57,7 @@ class WorldVerdict(TypedDict):
     world: str
     satisfied: bool
     status: str
-    error: ErrorOfRun | None
+    error: RunErrorData | None
     line: int | None
     failed_checks: list[str]
     trace: list[Annotated[list[Any], msgspec.Meta(min_length=2)]]  # a kind, a text and more

@@ -63,7 +63,7 @@ class JudgingScope:
         """Count completions. Models, cut-off replies and missions count only for `tasks`; None means all."""
         every = list(completions)
         selected = [one for one in every if tasks is None or one.task in tasks]
-        missions = [(one.acted.ending, one.turns) for one in selected if one.acted is not None]
+        missions = [(one.mission.ending, one.turns) for one in selected if one.mission is not None]
         settings = about.get("settings")
         limit = settings.get("max_tokens") if isinstance(settings, dict) else None
         return cls(

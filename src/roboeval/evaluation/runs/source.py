@@ -48,7 +48,7 @@ def open_source(text: str, suite: Suite) -> Source:
 MAX_ANSWER_BYTES = 10 * MAX_ROW  # an answer may contain more than we keep
 
 
-def is_answers(path: Path) -> bool:
+def is_batch_file(path: Path) -> bool:
     """Return whether a file begins with a request to a batch endpoint, or with an answer from one."""
     if not path.is_file():
         return False

@@ -175,11 +175,11 @@ def _known_of(written: Completion) -> dict[str, Any]:
     if written.finish_reason is not None:
         known["cut_off"] = written.is_cut_off
     known |= {"mode": written.mode, "turns": 1, **reply_numbers(written)}
-    if (acted := written.acted) is None:
+    if (end := written.mission) is None:
         return known
     counts = written.more.get("tool_errors")
     errors = [number_or_none(one, int) or 0 for one in counts.values()] if isinstance(counts, dict) else []
-    mission = {"ending": acted.ending, "mission_world": acted.world, "turns": written.turns}
+    mission = {"ending": end.ending, "mission_world": end.world, "turns": written.turns}
     return {**known, **mission, "tool_errors": sum(errors)}
 
 
@@ -192,7 +192,7 @@ TABLE_FORMATS = ("csv", "parquet")
 TABLE_BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # the first bytes of tables in these formats
 
 
-def kind_of(path: Path | None) -> str:
+def table_format(path: Path | None) -> str:
     """Return `parquet` for a file name with this ending, or `csv` for any other name and for None."""
     ending = "" if path is None else path.suffix.removeprefix(".").lower()
     return ending if ending in TABLE_FORMATS else TABLE_FORMATS[0]

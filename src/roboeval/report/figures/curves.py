@@ -43,7 +43,7 @@ def draw_thresholds(runs: Sequence[JudgedRun]) -> Figure:
 
 def most_completions(runs: Sequence[JudgedRun]) -> int:
     """Return the largest number of completions of a prompt, but at least 2, so that the axis has a length."""
-    return max(2, *(prompt.n for run in runs for score in run.scores for prompt in score.prompts))
+    return max(2, *(prompt.completions for run in runs for score in run.scores for prompt in score.prompts))
 
 
 def draw_accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
@@ -76,9 +76,9 @@ def _plot_lines(lines: Mapping[str, Points], height: float, **style: Any) -> Fig
 
 def _steps(points: Points, most: int) -> Points:
     """Cut a curve at the threshold 1 / `most`, where the axis ends."""
-    end = 1 / most
-    shown = [(threshold, share) for threshold, share in points if threshold >= end]
-    return [*shown, (end, shown[-1][1])]
+    lowest = 1 / most
+    shown = [(threshold, share) for threshold, share in points if threshold >= lowest]
+    return [*shown, (lowest, shown[-1][1])]
 
 
 def _threshold_axes(axes: Axes, most: int) -> None:

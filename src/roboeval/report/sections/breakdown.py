@@ -60,7 +60,7 @@ def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
                 lost = sum(failure_of(row)["kind"] == NO_SUCH_ROOM_ERROR for row in failed)
                 shares = [count / len(failed) if failed else None for count in (away, lost)]
                 passed = mean_of([[prompt.pass_at(1) for prompt in prompts_of(scores)]])
-                counts = sum(one.n for one in scores), passed, len(failed)
+                counts = sum(one.completions for one in scores), passed, len(failed)
                 rows.append([run.name, name, *counts, away, shares[0], lost, shares[1]])
     return sheet("coming-back", rows)
 
@@ -89,7 +89,7 @@ def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     for run in runs:
         for score in run.scores:
             if len(score.prompts) > 1:
-                worst, best = (end(score.prompts, key=lambda one: one.pass_at(1)) for end in (min, max))
+                worst, best = (choose(score.prompts, key=lambda one: one.pass_at(1)) for choose in (min, max))
                 ends = worst.prompt, worst.pass_at(1), best.prompt, best.pass_at(1)
                 texts = [run.instructions.get((score.task, one.prompt)) for one in (worst, best)]
                 rows.append([score.task, run.name, ends[3] - ends[1], *ends, *distinct_words(*texts)])

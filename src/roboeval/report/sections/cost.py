@@ -23,7 +23,7 @@ from roboeval.report.runs import JudgedRun, runs_to_draw
 from roboeval.report.sheets import Cell, ReportFigure, Section, Sheet, section, sheet
 
 
-def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
+def rejection_sampling_section(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on rejection sampling: asking the model again until the check accepts a program."""
     checked = {run.name: run.checked for run in runs if run.checked}
     points = {name: retry_curves(prompts) for name, prompts in checked.items()}

@@ -108,7 +108,7 @@ def _cells(one: FailureGroup) -> list[Cell]:
 # --- verdicts under another suite, and under house rules
 
 
-def other_suite(runs: Sequence[JudgedRun]) -> Section:
+def other_suite_section(runs: Sequence[JudgedRun]) -> Section:
     """Build the section that compares verdicts under the report's suite with those under another suite."""
     found = [
         verdict_changes(run.name, run.results, run.other_suite) for run in runs if run.other_suite is not None
@@ -132,7 +132,7 @@ def other_suite(runs: Sequence[JudgedRun]) -> Section:
     return section("beside", Prose(sentences(found)), *sheets)
 
 
-def house(runs: Sequence[JudgedRun]) -> Section:
+def house_rules_section(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on house rules, for runs judged both with and without them."""
     rows: list[list[Cell]] = []
     by_rule: list[list[Cell]] = []

@@ -9,7 +9,7 @@ from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import Cell, Prose, Section, section, sheet
 
 
-def question(runs: Sequence[JudgedRun]) -> Section:
+def question_section(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on asking a person one question, for runs that `roboeval clarify` has measured."""
     found = [(run.name, *each) for run in runs for each in read_measurements(run.results)]
     rows: list[list[Cell]] = []

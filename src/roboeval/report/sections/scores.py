@@ -30,7 +30,7 @@ from roboeval.report.runs import JudgedRun, coverage_of, runs_to_draw, tasks_of
 from roboeval.report.sheets import Cell, Prose, ReportFigure, Section, Sheet, note, section, sheet
 
 
-def results(runs: Sequence[JudgedRun]) -> Section:
+def results_section(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on pass@1 by run and task."""
     coverage = coverage_of(runs)
     by_run = ReportFigure("overall", lambda: figures.draw_overall(runs), coverage)
@@ -71,13 +71,13 @@ def task_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
-    passed, coverage = score.pass_at(1), run.results.scope.coverage(score.n, score.task)
+    passed, coverage = score.pass_at(1), run.results.scope.coverage(score.completions, score.task)
     ends = (passed.low, passed.high) if passed.is_known else (None, None)
     counts = coverage.judged, coverage.total
     return [score.task, run.name, what, *counts, passed.mean, *ends, score.lowest(1), score.highest(1)]
 
 
-def thresholds(runs: Sequence[JudgedRun]) -> Section:
+def thresholds_section(runs: Sequence[JudgedRun]) -> Section:
     """Build the section on the share of prompts that reach each pass@1 (paper, section V.A)."""
     drawn, left_out = runs_to_draw(runs)
     figure = ReportFigure("thresholds", lambda: draw_thresholds(drawn), left_out)
@@ -92,7 +92,7 @@ def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     return sheet("curve", rows, shares=[run.name for run in runs])
 
 
-def differences(runs: Sequence[JudgedRun]) -> Section:
+def differences_section(runs: Sequence[JudgedRun]) -> Section:
     """Build the section that compares runs in pairs. If there are many, it compares each with the best."""
     rows: list[list[Cell]] = []
     sentences: list[str] = []
@@ -118,7 +118,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
     return section("differences", Prose(sentences), sheet("differences", rows, notes=notes))
 
 
-def leader(runs: Sequence[JudgedRun]) -> list[str]:
+def leader_sentences(runs: Sequence[JudgedRun]) -> list[str]:
     """Return a sentence that compares the two best runs, or an empty list if they cannot be compared."""
     if len(runs) == 1:
         return []

@@ -14,7 +14,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.text.words import counted, listed
 from codebotler.models.recorded import InstructionSolutions, Solution
-from roboeval.suites.families.tasks import TrainedTask, family_names, suite_file, trained_task
+from roboeval.suites.families.tasks import GeneratedTask, family_names, suite_file, trained_task
 from roboeval.suites.suite import Suite
 from roboeval.suites.task import Task
 
@@ -110,13 +110,13 @@ def family_suite(which: FamilyTasks, skills: SkillTable = SKILLS) -> Suite:
     )
 
 
-def _named(name: str, made: TrainedTask) -> Task:
+def _named(name: str, made: GeneratedTask) -> Task:
     """Return a task with its name in the suite and the path of its family's file."""
     task = made.suite.tasks[made.name]
     return replace(task, name=name, path=task.path.with_name(f"{name.partition('-')[0]}.yaml"))
 
 
-def _recorded(made: TrainedTask) -> Iterator[InstructionSolutions]:
+def _recorded(made: GeneratedTask) -> Iterator[InstructionSolutions]:
     """Yield the programs of recorded models. Careful models are right, hasty ones may be wrong at first."""
     right = Solution(about="right", program=made.solution)
     wrong = [Solution(about=one.about, program=one.program, fails="unknown") for one in made.wrong]

@@ -77,7 +77,7 @@ class FamilyFile(StrictForm):
 
 
 @dataclass(frozen=True)
-class TrainedTask:
+class GeneratedTask:
     """A task generated from a family for one seed, with one correct program and several incorrect ones."""
 
     suite: Suite  # a suite that contains only this task
@@ -111,7 +111,7 @@ def family_file(family: str) -> Path:
     return FAMILY_FOLDER / "templates" / f"{family}.yaml"
 
 
-def trained_task(family: str, seed: int, *, worlds: int = TRAINING_WORLDS) -> TrainedTask:
+def trained_task(family: str, seed: int, *, worlds: int = TRAINING_WORLDS) -> GeneratedTask:
     """Generate the task of a family for a seed. Equal arguments give equal tasks.
 
     Args:
@@ -155,7 +155,7 @@ def _choices(family: str, seed: int) -> tuple[_Template, dict[str, str], Random]
 
 
 @lru_cache(maxsize=1_024)
-def _generate(family: str, seed: int, worlds: int) -> TrainedTask:
+def _generate(family: str, seed: int, worlds: int) -> GeneratedTask:
     template, chosen, random = _choices(family, seed)
     path = template.path
     file = YamlFile(_fill(template.text, chosen, path), path)
@@ -179,7 +179,7 @@ def _generate(family: str, seed: int, worlds: int) -> TrainedTask:
     )
     digest = hashlib.sha256(f"{head.version} {worlds} {seed} {task_file.data}".encode()).hexdigest()
     suite = Suite(TRAINING_SUITE, head.version, head.about, rules.settings(), {name: task}, digest)
-    return TrainedTask(suite, name, form.solution, form.wrong)
+    return GeneratedTask(suite, name, form.solution, form.wrong)
 
 
 def _forbid_retraction(task: Task) -> Task:

@@ -65,7 +65,7 @@ def test_rows_near_the_limit_can_be_read_from_their_copy(tmp_path: Path, paper: 
     row = ROW | {"program": program}
     path.write_text(json.dumps(row, ensure_ascii=False).replace("\ud800", "\\ud800"))
     run = RunFolder(tmp_path / "run")
-    run.keep(open_source(str(path), paper).completions)
+    run.import_completions(open_source(str(path), paper).completions)
     assert [c.program for c in read_completions(run.completions)] == [program]
 
 
@@ -76,7 +76,7 @@ def test_a_row_whose_copy_would_be_too_long_is_refused(tmp_path: Path, paper: Su
     assert len(line) < MAX_ROW
     assert "5,000,000 bytes" in error_about(path, line).sentence
     with pytest.raises(UserError, match="5,000,000 bytes"):
-        RunFolder(tmp_path / "run").keep(open_source(str(path), paper).completions)
+        RunFolder(tmp_path / "run").import_completions(open_source(str(path), paper).completions)
     assert not (tmp_path / "run").exists()
 
 

@@ -48,7 +48,7 @@ def judge_run(run: RunFolder, suite: Suite, *, redo: bool = False) -> list[Row]:
 
 def careful_run(path: Path, suite: Suite) -> RunFolder:
     run = RunFolder(path)
-    run.keep([*recorded_completions("recorded:careful", suite)])
+    run.import_completions([*recorded_completions("recorded:careful", suite)])
     return run
 
 
@@ -315,8 +315,8 @@ def test_more_or_fewer_completions_are_others(tmp_path: Path, paper: Suite, more
     run = make_run(tmp_path / "run", [GREETS, "#"])
     other = make_run(tmp_path / "other", [GREETS, "#", more] if more else [GREETS])
     with pytest.raises(UserError, match="different completions"):
-        run.keep(open_source(str(other.path), paper).completions)
-    run.keep(open_source(str(run.path), paper).completions)
+        run.import_completions(open_source(str(other.path), paper).completions)
+    run.import_completions(open_source(str(run.path), paper).completions)
 
 
 def test_an_interrupted_copy_leaves_no_run(tmp_path: Path) -> None:
@@ -333,7 +333,7 @@ def test_an_interrupted_copy_leaves_no_run(tmp_path: Path) -> None:
     for path in (tmp_path / "there" / "run", tmp_path / "new" / "run", tmp_path / "there"):
         one = Completion(task="SayGoodDay", prompt=0, index=0, program=GREETS)
         with pytest.raises(KeyboardInterrupt):
-            RunFolder(path).keep(Interrupted([one]))
+            RunFolder(path).import_completions(Interrupted([one]))
     assert sorted(path.name for path in tmp_path.rglob("*")) == [".lock", "there"]
 
 
@@ -387,7 +387,7 @@ def test_a_completion_keeps_fields_of_other_tools(tmp_path: Path, paper: Suite) 
     path = tmp_path / "rows.jsonl"
     path.write_bytes(to_line(row))
     run = RunFolder(tmp_path / "run")
-    run.keep(open_source(str(path), paper).completions)
+    run.import_completions(open_source(str(path), paper).completions)
     assert [c.row for c in read_completions(run.completions)] == [row]
     assert Completion.of(row).key == ("SayGoodDay", 0, 0)
 

@@ -15,7 +15,7 @@ from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
 from codebotler.core.world import Room, World
 from codebotler.rtl import parse
 from made_results import row_of, table_of
-from roboeval.analysis.search import TraceQuery, match_row
+from roboeval.analysis.search import TraceQuery, search_row
 from roboeval.cli.views.completions import completion_view
 from roboeval.evaluation.judging.explanation import completion_data
 from roboeval.evaluation.judging.failures import Verdict
@@ -131,7 +131,7 @@ def test_a_table_counts_all_events_of_a_cut_trace(suite: Suite) -> None:
 @pytest.mark.parametrize("negated", [False, True])
 def test_a_formula_is_undecided_where_the_trace_was_cut(suite: Suite, *, negated: bool) -> None:
     formula = 'tr.Exists(say("bye"))'
-    found = match_row(cut_row(suite), TraceQuery(parse(formula), negated))
+    found = search_row(cut_row(suite), TraceQuery(parse(formula), negated))
     assert found.cut == ((1, "World 0"),)
     assert found.worlds == (((2, "World 1"),) if negated else ())
-    assert len(match_row(cut_row(suite), TraceQuery()).worlds) == 2
+    assert len(search_row(cut_row(suite), TraceQuery()).worlds) == 2

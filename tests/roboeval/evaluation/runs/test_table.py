@@ -15,7 +15,7 @@ import pytest
 from codebotler.core.errors import UserError
 from made_results import results_of
 from roboeval.evaluation.runs.completions import Completion
-from roboeval.evaluation.runs.table import COMPLETION_COLUMNS, WORLD_COLUMNS, kind_of, write_table
+from roboeval.evaluation.runs.table import COMPLETION_COLUMNS, WORLD_COLUMNS, table_format, write_table
 
 PROGRAM = "def task_program():\n    go_to('x')\n"
 COMPLETION = Completion(task="Visit", prompt=1, index=2, program=PROGRAM, model="recorded:careful")
@@ -195,5 +195,5 @@ def test_a_wrong_format_or_folder_is_refused(tmp_path: Path) -> None:
 
 def test_the_name_of_a_file_decides_the_format() -> None:
     names = (None, "x", "x.txt", "x.csv", "x.PARQUET", "dir.parquet/x")
-    kinds = [kind_of(None if name is None else Path(name)) for name in names]
+    kinds = [table_format(None if name is None else Path(name)) for name in names]
     assert kinds == ["csv", "csv", "csv", "csv", "parquet", "csv"]

@@ -33,7 +33,7 @@ class Channel:
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._writer = threading.Thread(target=self._write, daemon=True)
         self._writer.start()
-        self.last_sign = float("inf")  # when the last line arrived; infinite while the line is handled
+        self.last_alive = float("inf")  # when the last line arrived; infinite while the line is handled
 
     def send(self, kind: str, **more: Any) -> None:
         """Queue a message of a kind such as `ready`, with more fields. It is lost if CodeBotler has died."""
@@ -49,9 +49,9 @@ class Channel:
         for line in iter(self._in.readline, ""):
             message = json.loads(line)
             if message.get("do") != "alive":
-                self.last_sign = float("inf")
+                self.last_alive = float("inf")
                 yield message
-            self.last_sign = time.monotonic()
+            self.last_alive = time.monotonic()
 
     def _write(self) -> None:
         for line in iter(self._lines.get, None):

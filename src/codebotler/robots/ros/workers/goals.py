@@ -57,7 +57,7 @@ class Server:
         self.name: str = call["server"]
         self.type: str = call["type"]
 
-    def last_sign(self) -> float:
+    def last_alive(self) -> float:
         """Return the monotonic time of the last sign of life, or the current time if this is not tracked."""
         return time.monotonic()
 
@@ -199,7 +199,7 @@ class SkillWorker:
         time.sleep(WATCH_SECONDS)  # ROS sends messages in its own threads
         return True
 
-    def look_after(self, goal: Goal, sent: float, now: float) -> None:
+    def check_goal(self, goal: Goal, sent: float, now: float) -> None:
         """End a goal as lost if its server has died or exceeded a time limit."""
         fault = self._find_fault(goal, sent, now)
         if fault is not None:
@@ -294,29 +294,29 @@ class SkillWorker:
 
     def _watch(self) -> None:
         """Send heartbeats and supervise the current goal, until our node leaves the graph."""
-        last_sign = 0.0
+        last_sent = 0.0
         while True:
             time.sleep(WATCH_SECONDS)
             now = time.monotonic()
-            if now - last_sign >= ALIVE_SECONDS:
+            if now - last_sent >= ALIVE_SECONDS:
                 self.channel.send("alive")
-                last_sign = now
+                last_sent = now
             if self.graph.has_left():
                 self.channel.send("gone", text=self.graph.explain_end())
                 return
             goal = self.goal
             if goal is None or goal.is_over:
                 continue
-            if now - self.channel.last_sign > TOOL_SILENCE:
+            if now - self.channel.last_alive > TOOL_SILENCE:
                 why = f"CodeBotler gave no sign of life for {TOOL_SILENCE:g} s, so the robot was stopped"
                 self.end(goal, "lost", text=why)
             elif goal.sent is not None:
-                self.look_after(goal, goal.sent, now)
+                self.check_goal(goal, goal.sent, now)
 
     def _find_fault(self, goal: Goal, sent: float, now: float) -> str | None:
         """Return a message that explains why a goal has failed, or None if it has not."""
         server, late = goal.server.name, now - self.patience
-        if max(goal.server.last_sign(), sent) < now - self.silence:
+        if max(goal.server.last_alive(), sent) < now - self.silence:
             why = self.silence_says or f"no status for {self.silence:g} s"
             return f"the action server at {server} has died: {why}"
         if goal.cancelled is not None and goal.cancelled < late:

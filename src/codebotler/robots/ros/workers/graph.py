@@ -8,7 +8,7 @@ import xmlrpc.client
 from typing import Any
 
 from channel import SetupError
-from message_types import OFFER_NAMES, offer_of, parts_of
+from message_types import OFFER_NAMES, provider_word, split_type
 
 ROS1_EXIT_SECONDS = 3.0  # the time limit for a worker to exit if its CodeBotler was just killed
 MASTER_SECONDS, NODE_SECONDS = 5.0, 2.0  # the time limits for answers from the master and from nodes
@@ -96,13 +96,13 @@ class Ros1Graph:
         if self.address_of(self.node) is None:
             return f"the ROS master at {self.uri} was restarted; connect again"
         nodes = self.nodes_of(server)
-        what = offer_of(type_name)
+        what = provider_word(type_name)
         if not nodes:
             return f"there is no {what} at {server}; start it"
         address = self.address_of(nodes[0])
         if address is None or not is_alive(address):
             return f"the {what} at {server} (node {nodes[0]}) has died; start it again"
-        whole, goal = "/".join(parts_of(type_name)), ""
+        whole, goal = "/".join(split_type(type_name)), ""
         if what == OFFER_NAMES["action"]:
             whole, goal = whole + "Action", "Goal"
         return (

@@ -28,7 +28,7 @@ def action_types(actions: list[Fields]) -> dict[str, Any]:
     """
     found = {}
     for action in actions:
-        package, name = parts_of(action["type"])
+        package, name = split_type(action["type"])
         try:
             found[action["type"]] = import_type(f"{package}/{name}Action", "msg")
         except SetupError:
@@ -40,7 +40,7 @@ def action_types(actions: list[Fields]) -> dict[str, Any]:
 
 def import_type(whole: str, kind: str) -> Any:
     """Import a type by its name and kind (msg or srv), or raise SetupError if it is not installed."""
-    package, name = parts_of(whole)
+    package, name = split_type(whole)
     try:
         return getattr(importlib.import_module(f"{package}.{kind}"), name)
     except (ImportError, AttributeError):
@@ -61,15 +61,15 @@ def as_data(value: Any) -> Any:
     return [as_data(each) for each in value] if isinstance(value, (list, tuple)) else value
 
 
-def parts_of(kind: str) -> tuple[str, str]:
+def split_type(type_name: str) -> tuple[str, str]:
     """Return the package and the name of a type such as std_msgs/String. The default package is our own."""
-    *package, name = kind.split("/")
+    *package, name = type_name.split("/")
     return package[0] if package else OWN_PACKAGE, name
 
 
-def offer_of(kind: str) -> str:
+def provider_word(type_name: str) -> str:
     """Return the word for the provider of a type, such as `service` for std_srvs/srv/Trigger."""
-    return OFFER_NAMES[kind.split("/")[1]]
+    return OFFER_NAMES[type_name.split("/")[1]]
 
 
 def generate_type(kind: str, text: str) -> Any:

@@ -38,7 +38,7 @@ class Ros1Server(Server):
             f"{topic}/picture", lambda message: worker.pass_picture(self, message["data"])
         )
 
-    def last_sign(self) -> float:
+    def last_alive(self) -> float:
         """Return the monotonic time of the server's last status message, or 0 before the first."""
         return self._last_status
 

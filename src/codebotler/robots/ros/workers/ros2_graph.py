@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from channel import SetupError
-from message_types import as_data, offer_of
+from message_types import as_data, provider_word
 from ros2_types import message_types
 
 DISCOVERY_SECONDS = 1.0  # the time a new node needs to discover most other nodes
@@ -90,7 +90,7 @@ class Ros2Graph:
     def explain_missing(self, server: str, type_name: str) -> str:
         """Return a message that explains why a server cannot be reached."""
         return (
-            f"there is no {offer_of(type_name)} of {type_name} at {server}; start it, or compare "
+            f"there is no {provider_word(type_name)} of {type_name} at {server}; start it, or compare "
             "ROS_DOMAIN_ID and the definitions on both sides"
         )
 

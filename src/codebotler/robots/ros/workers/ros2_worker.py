@@ -58,7 +58,7 @@ class Ros2Server(Server):
         )
         self.has_cancelled = False
 
-    def last_sign(self) -> float:
+    def last_alive(self) -> float:
         """Return the monotonic time if the server is on the graph, else 0. DDS removes dead servers late."""
         return time.monotonic() if self.client.server_is_ready() else 0.0
 
@@ -212,9 +212,9 @@ class Ros2Worker(SkillWorker):
     def _report(self, text: str) -> None:
         self.channel.send("progress", text=text)
 
-    def look_after(self, goal: Goal, sent: float, now: float) -> None:
+    def check_goal(self, goal: Goal, sent: float, now: float) -> None:
         """Check a goal, and repeat requests: a cancel can overtake its goal, and an answer can get lost."""
-        super().look_after(goal, sent, now)
+        super().check_goal(goal, sent, now)
         if goal.is_over or goal.handle is None:  # calls of services and topics have no handle
             return
         if (

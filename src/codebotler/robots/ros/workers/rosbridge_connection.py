@@ -19,7 +19,7 @@ from websockets.sync.client import connect
 
 from channel import Fields
 from goals import ROS1_ENDS, ROS2_ENDS
-from message_types import parts_of
+from message_types import split_type
 
 VERSION_REQUEST = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
 VERSION_SECONDS = 2.0  # how long to wait for the ROS version; a rosbridge without rosapi does not answer
@@ -51,7 +51,7 @@ class Ros1Protocol:
 
     def opening(self, server: str, action: str) -> Iterator[Fields]:
         """Yield messages that advertise goals and cancels, and subscribe to the server's other topics."""
-        kind = "/".join(parts_of(action)) + "Action"
+        kind = "/".join(split_type(action)) + "Action"
         for op, name, of in (
             ("advertise", "goal", f"{kind}Goal"),
             ("advertise", "cancel", "actionlib_msgs/GoalID"),
@@ -104,7 +104,7 @@ class Ros2Protocol:
             "op": "send_action_goal",
             "id": goal,
             "action": server,
-            "action_type": "/action/".join(parts_of(action)),
+            "action_type": "/action/".join(split_type(action)),
             "args": fields,
             "feedback": True,
         }

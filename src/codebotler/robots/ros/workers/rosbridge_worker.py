@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from channel import Fields, SetupError, serve
 from goals import Goal, Server, SkillWorker
-from message_types import parts_of
+from message_types import split_type
 from rosbridge_connection import (
     CONNECTION_FAULTS,
     INSIST_SECONDS,
@@ -29,9 +29,9 @@ class RosbridgeServer(Server):
         self._connection = connection
         self._since = time.monotonic()
         if self.kind == "topic":
-            connection.send({"op": "advertise", "topic": self.name, "type": "/".join(parts_of(self.type))})
+            connection.send({"op": "advertise", "topic": self.name, "type": "/".join(split_type(self.type))})
 
-    def last_sign(self) -> float:
+    def last_alive(self) -> float:
         """Return the monotonic time of the server's last status, or the current time if it sends none."""
         if self._connection.protocol.has_status and self.kind == "action":
             return self._connection.heard.get(self.name, 0.0)
@@ -102,7 +102,7 @@ class RosbridgeWorker(SkillWorker):
             self._message = protocol.goal(server.name, server.type, number, fields)
             goal.stop = lambda: server.cancel(number)
         elif server.kind == "service":
-            about = {"id": number, "service": server.name, "type": "/".join(parts_of(server.type))}
+            about = {"id": number, "service": server.name, "type": "/".join(split_type(server.type))}
             self._message = {"op": "call_service", **about, "args": fields}
         else:
             self._message = {"op": "publish", "topic": server.name, "msg": fields}
@@ -113,11 +113,11 @@ class RosbridgeWorker(SkillWorker):
         if server.kind == "topic":
             self.end(goal, "result", values={})
 
-    def look_after(self, goal: Goal, sent: float, now: float) -> None:
+    def check_goal(self, goal: Goal, sent: float, now: float) -> None:
         """Check the goal, and send a goal or a cancel again if it had no effect."""
         if self.graph.is_lost:
             return
-        super().look_after(goal, sent, now)
+        super().check_goal(goal, sent, now)
         with goal.lock:
             if not self.graph.protocol.has_status or goal.is_over or now < self._again:
                 return
