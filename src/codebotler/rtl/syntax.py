@@ -75,9 +75,7 @@ class _Parser(FormulaSource):
         self.means, self.sets = means, sets
         self.recordings = skills.recordings
         self.skill_of = {s.recording.kind: s for s in skills.rows if s.recording}
-        self.types = {
-            s.recording.kind: {p.name: p.type for p in s.parameters} for s in skills.rows if s.recording
-        }
+        self.types = {kind: {p.name: p.type for p in s.parameters} for kind, s in self.skill_of.items()}
         self.question = next((kind for kind, row in self.recordings.items() if row.options is not None), None)
         looks = (kind for kind, row in self.recordings.items() if row.names == "object or person")
         self.look = next(looks, None)
