@@ -265,7 +265,7 @@ class RequestLog:
 
     def _read(self) -> set[CompletionKey]:
         pending: set[CompletionKey] = set()
-        for number, row in read_rows(self.path, growing=True) if self.path.exists() else ():
+        for number, row in read_rows(self.path) if self.path.exists() else ():
             match row:
                 case {"sent": [str(task), int(prompt), int(index)]}:
                     pending.add((task, prompt, index))
