@@ -215,18 +215,12 @@ class Ros2Worker(SkillWorker):
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
         """Check a goal, and repeat requests: a cancel can overtake its goal, and an answer can get lost."""
         super().look_after(goal, sent, now)
-        if goal.is_over or goal.handle is None:  # calls of services and topics have no handle
+        handle, cancelled, ended = goal.handle, goal.cancelled, goal.status_ended
+        if goal.is_over or handle is None:  # calls of services and topics have no handle
             return
-        if (
-            goal.cancelled is not None
-            and not goal.handle.is_cancelling
-            and now - goal.cancelled > WATCH_SECONDS
-        ):
+        if cancelled is not None and not handle.is_cancelling and now - cancelled > WATCH_SECONDS:
             self.graph.call_soon(self._cancel, goal)
-        if (
-            goal.status_ended is not None
-            and now - max(goal.status_ended, goal.handle.result_request) > RESULT_SECONDS
-        ):
+        if ended is not None and now - max(ended, handle.result_request) > RESULT_SECONDS:
             self.graph.call_soon(self._request_result, goal)
 
     def _send(self, goal: Goal, message: Any) -> None:
