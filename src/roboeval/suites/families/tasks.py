@@ -16,7 +16,6 @@ from pydantic import Field
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
-from codebotler.core.skills.paper import SKILLS
 from codebotler.core.text.words import listed
 from codebotler.core.world_file import Name, YamlText
 from codebotler.core.yaml_files import YamlFile
@@ -166,19 +165,11 @@ def _generate(family: str, seed: int, worlds: int) -> TrainedTask:
         content["prompts"] = [*_phrasings(template, chosen, random)]
     task_file = file.part("task", content)
     head = suite_file()
-    rules = head.rules
-    task = _forbid_retraction(
-        read_task(
-            task_file,
-            path.with_name(f"{name}.yaml"),
-            SKILLS,
-            count=worlds,
-            seed=seed,
-            words=rules.words_for_people,
-        )
-    )
+    words = head.rules.words_for_people
+    task = read_task(task_file, path.with_name(f"{name}.yaml"), count=worlds, seed=seed, words=words)
     digest = hashlib.sha256(f"{head.version} {worlds} {seed} {task_file.data}".encode()).hexdigest()
-    suite = Suite(TRAINING_SUITE, head.version, head.about, rules.settings(), {name: task}, digest)
+    tasks = {name: _forbid_retraction(task)}
+    suite = Suite(TRAINING_SUITE, head.version, head.about, head.rules.settings(), tasks, digest)
     return TrainedTask(suite, name, form.solution, form.wrong)
 
 
@@ -187,7 +178,7 @@ def _forbid_retraction(task: Task) -> Task:
 
     A separate requirement would already hold at the start and so reward incorrect programs.
     """
-    no_retraction = parse(f'not tr.Exists(say(r"{RETRACTION}"))', skills=SKILLS)
+    no_retraction = parse(f'not tr.Exists(say(r"{RETRACTION}"))')
 
     def strict(one: Requirement) -> Requirement:
         return replace(one, formula=And((one.formula, no_retraction)))
