@@ -183,9 +183,7 @@ def _build_suite(
         about=head.about,
         settings=head.rules.settings(),
         tasks={task.name: task for task in tasks},
-        digest=_digest(
-            [file, *documents, *(lender for lender in lenders if lender is not None)], tasks, house, own
-        ),
+        digest=_digest([file, *documents, *filter(None, lenders)], tasks, house, own),
         house=house,
         folder=folder,
         worlds=count if is_sampled else None,

@@ -246,9 +246,8 @@ class _Declaration:
             names = [each.name for each in parameters]
             if recording is not None:  # in the order of the event
                 names = [name for name in (recording.text, *recording.more) if name]
-            return verb_of(
-                verb, names, self.options.get("results", ("no", "yes")), self.options.get("past", "")
-            )
+            results = self.options.get("results", ("no", "yes"))
+            return verb_of(verb, names, results, self.options.get("past", ""))
         except ValueError as error:
             self.wrong(f"{error}")
 

@@ -243,9 +243,8 @@ def _format_call(node: ast.expr, names: Names) -> str:
         case ast.Name(name):
             return name
         case ast.Call(ast.Name(name), arguments, []):
-            return (
-                f"{name}({', '.join(_format_argument(evaluate(argument, names)) for argument in arguments)})"
-            )
+            given = [_format_argument(evaluate(argument, names)) for argument in arguments]
+            return f"{name}({', '.join(given)})"
     raise ExpressionError(f'"{ast.unparse(node)}" is not a requirement; write check(x) or not check(x)')
 
 
