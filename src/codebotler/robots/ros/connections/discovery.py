@@ -64,9 +64,8 @@ def discover_offers(address: str, python: Path) -> list[str]:
     worker = RosWorker(choose_python(python), "discovery_worker.py", {}, {"ROS_DOMAIN_ID": domain})
     worker.leave()
     if not worker.about["offers"]:
-        raise NotReadyError(
-            f"no node was found with ROS_DOMAIN_ID {domain}; start the robot, or set another --address"
-        )
+        mend = "start the robot, or set another --address"
+        raise NotReadyError(f"no node was found with ROS_DOMAIN_ID {domain}; {mend}")
     return [" ".join(offer) for offer in worker.about["offers"]]
 
 

@@ -80,9 +80,8 @@ class Ros1Graph:
         """Return the names of nodes registered for an action, a topic or a service, even if they are dead."""
         _, subscribers, services = self._master.getSystemState()
         name = self._rosgraph.names.resolve_name(server, self.node)
-        return [
-            node for one, nodes in subscribers + services if one in {name, name + "/goal"} for node in nodes
-        ]
+        names = {name, name + "/goal"}
+        return [node for one, nodes in subscribers + services if one in names for node in nodes]
 
     def has_publisher(self, topic: str) -> bool:
         """Return whether a publisher is registered for a topic."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -195,9 +196,8 @@ class Ros2Worker(SkillWorker):
         goal.sent = time.monotonic()
         if not isinstance(goal.server, Ros2Server):
             goal.is_acknowledged = True
-            self.graph.call_soon(
-                goal.server.perform, message, lambda values: self.finish(goal, "succeeded", values)
-            )
+            end = partial(self.finish, goal, "succeeded")
+            self.graph.call_soon(goal.server.perform, message, end)
             return
         goal.handle = Ros2Goal()
         goal.stop = lambda: self.graph.call_soon(self._cancel, goal)
@@ -267,9 +267,8 @@ class Ros2Worker(SkillWorker):
         client = goal.server.client
         accepted = goal.server.spec.Impl.SendGoalService.Response(accepted=True)
         handle = ClientGoalHandle(client, UUID(uuid=goal.handle.uuid), accepted)
-        client._get_result_async(handle).add_done_callback(
-            lambda done: self._finish_goal(goal, done.result())
-        )
+        answer = client._get_result_async(handle)
+        answer.add_done_callback(lambda done: self._finish_goal(goal, done.result()))
 
     def _cancel(self, goal: Goal) -> None:
         answer = goal.server.request_cancel(goal.handle.uuid)

@@ -30,13 +30,8 @@ class ActionServers:
         specs = action_types(list(start["actions"].values()))
         self.servers: list[Any] = []
         for skill, action in start["actions"].items():
-            server = actionlib.ActionServer(
-                action["server"],
-                specs[action["type"]],
-                self._make_callback(skill),
-                self._cancel,
-                auto_start=False,
-            )
+            name, spec, start_goal = action["server"], specs[action["type"]], self._make_callback(skill)
+            server = actionlib.ActionServer(name, spec, start_goal, self._cancel, auto_start=False)
             server.start()
             self.servers.append(server)
         channel.send("ready", has_master=self.master is not None)
