@@ -204,9 +204,8 @@ def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
         elif match := NUMBER_RANGE.fullmatch(choice):
             least, most = int(match[1]), int(match[2])
             if not least <= most < len(NUMBER_WORDS):
-                raise file.wrong(
-                    "the range is not valid; write ascending numbers up to 10, such as 2 to 4", "choose", name
-                )
+                mend = "write ascending numbers up to 10, such as 2 to 4"
+                raise file.wrong(f"the range is not valid; {mend}", "choose", name)
             number = random.randint(least, most)
             yield from ((name, str(number)), (f"{name}_word", NUMBER_WORDS[number]))
         elif match := SEVERAL_WORDS.fullmatch(choice):
@@ -255,9 +254,8 @@ def _phrasings(template: _Template, chosen: Mapping[str, str], random: Random) -
         filled = _fill(prompt, chosen, template.path)
         text = " ".join(SYNONYMS.sub(lambda match: random.choice(match[1].split("|")), filled).split())
         if "{" in text or "}" in text:
-            raise template.file.wrong(
-                "braces are not balanced; write synonyms as {go|drive}", "task", "prompts", number
-            )
+            sentence = "braces are not balanced; write synonyms as {go|drive}"
+            raise template.file.wrong(sentence, "task", "prompts", number)
         yield text
 
 

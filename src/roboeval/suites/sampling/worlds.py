@@ -117,9 +117,8 @@ class WorldSampler:
             named = fnmatch.filter(self.factors, pattern)
             anywhere = level in (*self.form.worlds.rooms, IN_NO_ROOM)
             may_be_anywhere = anywhere and (len(named) == 1 or level == IN_NO_ROOM)
-            fitting = [
-                f for f in named if level in self.factors[f] or (may_be_anywhere and f.endswith(".in"))
-            ]
+            places = [factor for factor in named if may_be_anywhere and factor.endswith(".in")]
+            fitting = [factor for factor in named if level in self.factors[factor] or factor in places]
             if not fitting:
                 known = ", ".join(self._free)
                 sentence = f'no factor that matches "{pattern}" can be "{level}"; the factors are {known}'
