@@ -192,10 +192,8 @@ def build_package(package: str, definitions: Definitions, tell: ProgressListener
         return folder
     missing = [name for name in COMPILERS.values() if shutil.which(name) is None]
     if missing:
-        raise SetupError(
-            f"{package} must be compiled once, but there is no {missing[0]}; "
-            f"install g++, or build {package} with colcon and source it"
-        )
+        mend = f"install g++, or build {package} with colcon and source it"
+        raise SetupError(f"{package} must be compiled once, but there is no {missing[0]}; {mend}")
     tell(f"building the ROS 2 messages of {package} once; this takes half a minute")
     home.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=str(home)) as temporary:

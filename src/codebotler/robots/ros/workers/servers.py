@@ -82,10 +82,8 @@ def start_master(port: int | None, uri: str) -> Any:
         try:
             probe.bind(("127.0.0.1", port))
         except OSError as error:
-            raise SetupError(
-                f"port {port} is in use by something that is not a ROS master ({error}); "
-                "name another port in ROS_MASTER_URI"
-            ) from None
+            why = f"port {port} is in use by something that is not a ROS master ({error})"
+            raise SetupError(f"{why}; name another port in ROS_MASTER_URI") from None
     master = rosmaster.master.Master(port)
     master.start()
     return master
