@@ -81,15 +81,15 @@ def read_lines(path: Path, *, limit: int = MAX_ROW) -> Iterator[tuple[int, bytes
             yield number, line
 
 
-def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the line number and data of each row of a JSON Lines file; if `growing`, skip a partial row."""
+def read_rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the line number and data of each row of a JSON Lines file. Skip a partial last row."""
     for number, line in read_lines(path):
         if line.strip():
             try:
                 row = parse_row(line)
             except UserError as error:
                 raise UserError(error.sentence, file=path, line=number) from None
-            if row is None and growing and not line.endswith(b"\n"):
+            if row is None and not line.endswith(b"\n"):
                 return
             if row is None:
                 raise UserError("this line is not JSON; correct or remove it", file=path, line=number)

@@ -259,14 +259,12 @@ def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
 
 def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
     undefined = undefined_names(tree, skills)
-    hints = _suggest_names(
-        tree, dict.fromkeys(name for _, name, is_local in undefined if not is_local), skills
-    )
+    unknown_names = dict.fromkeys(name for _, name, is_local in undefined if not is_local)
+    hints = _suggest_names(tree, unknown_names, skills)
     called = {n.func.id for n in nodes(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)}
     for line, name, is_local in undefined:
         if is_local:
-            message = f"the local variable {name} is used before it has a value"
-            yield Flaw(line, "UnboundLocalError", message)
+            yield Flaw(line, "UnboundLocalError", f"the local variable {name} is used before it has a value")
         else:
             hint = f"; did you mean {hints[name]}?" if name in hints else ""
             if not hint and name in called:

@@ -151,10 +151,8 @@ def laid_out(world: World) -> World:
             right, high = left + ROOM_WIDTH, low + ROOM_DEPTH
             footprint = ((left, low), (right, low), (right, high), (left, high))
             placed += 1
-        centre = (
-            sum(x for x, _ in footprint) / len(footprint),
-            sum(y for _, y in footprint) / len(footprint),
-        )
+        xs, ys = zip(*footprint, strict=True)
+        centre = (sum(xs) / len(xs), sum(ys) / len(ys))
         rooms.append(replace(room, footprint=footprint, stand_at=room.stand_at or centre))
     return replace(world, rooms=tuple(chain.from_iterable(_with_places(room, world) for room in rooms)))
 

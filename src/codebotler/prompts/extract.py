@@ -135,9 +135,8 @@ class _Block:
     @property
     def is_outline(self) -> bool:
         """Whether its `task_program` contains nothing but a docstring, `...` or `pass`."""
-        return self.tree is not None and any(
-            all(map(_is_idle, e.body)) for e in task_definitions(self.tree)[-1:]
-        )
+        definitions = [] if self.tree is None else task_definitions(self.tree)
+        return any(all(map(_is_idle, last.body)) for last in definitions[-1:])
 
 
 def _is_idle(statement: ast.stmt) -> bool:

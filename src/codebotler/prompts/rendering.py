@@ -111,9 +111,8 @@ def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
     """
     stops = [at for at in (reply.find(text) for text in stop) if at >= 0]
     end = min(stops, default=len(reply))
-    for found in islice(
-        re.finditer(r"\n(?=[^\s#)\]}])", reply[: min(end, MAX_SEARCHED_LENGTH)]), MAX_END_TRIES
-    ):
+    outer_lines = re.finditer(r"\n(?=[^\s#)\]}])", reply[: min(end, MAX_SEARCHED_LENGTH)])
+    for found in islice(outer_lines, MAX_END_TRIES):
         if not isinstance(parse_program(opening + reply[: found.start()]), Flaw):
             return found.start()
     return end

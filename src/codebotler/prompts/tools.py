@@ -116,14 +116,8 @@ def _schema(value: ValueType) -> dict[str, Any]:
 
 def object_schema(properties: dict[str, Any]) -> str:
     """Return the JSON Schema, as JSON text, of an object that has all of these properties and no others."""
-    return json.dumps(
-        {
-            "type": "object",
-            "properties": properties,
-            "required": [*properties],
-            "additionalProperties": False,
-        }
-    )
+    closed = {"required": [*properties], "additionalProperties": False}
+    return json.dumps({"type": "object", "properties": properties, **closed})
 
 
 _MORE_TOOLS = (

@@ -116,9 +116,8 @@ class Face:
             CancelledError: the question was withdrawn, or the mission was stopped before.
         """
         with self._lock:
-            question = FaceQuestion(
-                self._next(), person, text, tuple(options), time.monotonic() + self._seconds
-            )
+            until = time.monotonic() + self._seconds
+            question = FaceQuestion(self._next(), person, text, tuple(options), until)
             self._show(replace(self.shown, question=question, ended=None))
             while self.shown.question is question:
                 left = question.until - time.monotonic()

@@ -78,10 +78,10 @@ class Simulated:
 
     def resume(self, past: Trace) -> None:
         """Repeat the successful steps of an earlier mission without delays, to restore its world."""
-        for event in (one for one in past if not one.failed):
-            rows = (one for one in self.skills.rows if one.recording and one.recording.kind == event.kind)
-            row = next(rows, None)
-            if row is not None:
+        rows = {row.recording.kind: row for row in self.skills.rows if row.recording}
+        for event in past:
+            row = rows.get(event.kind)
+            if row is not None and not event.failed:
                 with suppress(RobotError):  # the world is another one, or a person said that this happened
                     perform_at_once(self._robot, row.name, arguments_of_event(row, event))
         self._place = self._stands_at[self._robot.room]

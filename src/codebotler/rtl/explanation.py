@@ -138,9 +138,8 @@ def _absence(test: formulas.PresenceTest, trace: Trace) -> _Fact:
     here = [*positions(test, trace)]
     if isinstance(test, formulas.Exists):
         event, detail = _describe_instead(element, trace, here)
-        return _Fact(
-            event, f"never {describe_action(element, 'past', negated=True, where=where)}", detail=detail
-        )
+        text = f"never {describe_action(element, 'past', negated=True, where=where)}"
+        return _Fact(event, text, detail=detail)
     if isinstance(test, formulas.Last):
         text = f"did not {describe_action(element, 'base', negated=True, when=' last', where=where)}"
         last = [f"{describe_event(trace[at], element)} (step {at + 1})" for at in here]

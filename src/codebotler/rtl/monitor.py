@@ -66,9 +66,7 @@ class Monitor:
 
     def would_hold(self, event: Event) -> bool:
         """Whether the formula would hold after an event; raise Inconclusive if an option is not a string."""
-        machine = self._machine
-        mask = machine.mask(event, self._seen)
-        return machine.step(self._state, mask)[1]
+        return self._machine.step(self._state, self._machine.mask(event, self._seen))[1]
 
 
 class _Machine:
@@ -87,11 +85,8 @@ class _Machine:
         self.steps: dict[tuple[Any, int], tuple[Any, bool]] = {}
 
     def mask(self, event: Event, at: int) -> int:
-        wanted = self._by_kind.get(event.kind)
-        if wanted is None:  # the usual case
-            return 0
         found = 0
-        for bit, element in wanted:
+        for bit, element in self._by_kind.get(event.kind, ()):
             if is_match(element, event, at):
                 found |= bit
         return found

@@ -92,9 +92,8 @@ def _repeat_texts(least: int, most: int, tree: Tree) -> list[str]:
 
 def _is_category(tree: Tree, *names: str) -> bool:
     op, arguments = tree[0]
-    return (
-        len(tree) == 1 and str(op) == "IN" and [str(value) for _, value in arguments] in [[n] for n in names]
-    )
+    members = [str(value) for _, value in arguments] if str(op) == "IN" else []
+    return len(tree) == len(members) == 1 and members[0] in names
 
 
 def _set_texts(members: Any) -> list[str]:  # noqa: ANN401 - private classes of `re`

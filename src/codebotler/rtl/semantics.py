@@ -6,12 +6,14 @@ A scope is a range of positions. A test reads the events once, in order, and sto
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from itertools import islice
 
 from codebotler.core.trace import Event, Option, Trace
 from codebotler.rtl import formulas
 
 
+@dataclass(eq=False, repr=False)
 class Inconclusive(Exception):  # noqa: N818 - a third verdict, not a mistake of the caller
     """Raised if a formula depends on an option of a question that is not a string.
 
@@ -21,15 +23,13 @@ class Inconclusive(Exception):  # noqa: N818 - a third verdict, not a mistake of
         option: the option.
     """
 
-    def __init__(self, event: int, number: int, option: Option) -> None:
-        option_is = f"option {number + 1} of the question at step {event + 1} is"
-        super().__init__(f"{option_is} not a string: {option.text}")
-        self.event = event
-        self.number = number
-        self.option = option
+    event: int
+    number: int
+    option: Option
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return type(self), (self.event, self.number, self.option), vars(self)
+    def __str__(self) -> str:
+        which = f"option {self.number + 1} of the question at step {self.event + 1}"
+        return f"{which} is not a string: {self.option.text}"
 
 
 def holds(formula: formulas.Formula, trace: Trace) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 from difflib import get_close_matches
 
 from codebotler.core.skills.kinds import INSIDE
@@ -15,6 +16,7 @@ SKILL_KINDS = {skill.name: skill.recording.kind for skill in SKILLS.rows if skil
 _MAX_SHOWN_LENGTH = 40
 
 
+@dataclass(eq=False, repr=False)
 class RtlSyntaxError(ValueError):
     """Raised for a string that is not a formula, with a message that gives the column and the reason.
 
@@ -23,13 +25,11 @@ class RtlSyntaxError(ValueError):
         problem: what is wrong there.
     """
 
-    def __init__(self, column: int, problem: str) -> None:
-        super().__init__(f"column {column}: {problem}")
-        self.column = column
-        self.problem = problem
+    column: int
+    problem: str
 
-    def __reduce__(self) -> tuple[object, ...]:
-        return type(self), (self.column, self.problem), vars(self)
+    def __str__(self) -> str:
+        return f"column {self.column}: {self.problem}"
 
 
 class FormulaSource:

@@ -75,9 +75,7 @@ class _Parser(FormulaSource):
         self.means, self.sets = means, sets
         self.recordings = skills.recordings
         self.skill_of = {s.recording.kind: s for s in skills.rows if s.recording}
-        self.types = {
-            s.recording.kind: {p.name: p.type for p in s.parameters} for s in skills.rows if s.recording
-        }
+        self.types = {kind: {p.name: p.type for p in s.parameters} for kind, s in self.skill_of.items()}
         self.question = next((kind for kind, row in self.recordings.items() if row.options is not None), None)
         looks = (kind for kind, row in self.recordings.items() if row.names == "object or person")
         self.look = next(looks, None)
@@ -146,10 +144,8 @@ class _Parser(FormulaSource):
         setting = [self.event_of(kind, thing) for kind, row in rows if row.sets == name]
         clearing = [self.event_of(kind, thing) for kind, row in rows if row.clears == name]
         scopes: list[tuple[formulas.Scope, ...]] = [(formulas.Scope("AfterLast", one),) for one in clearing]
-        parts = [
-            _joined(formulas.Or, [formulas.Exists(one, scope) for one in setting]) for scope in scopes or [()]
-        ]
-        return _joined(formulas.And, parts)
+        ways = [[formulas.Exists(one, scope) for one in setting] for scope in scopes or [()]]
+        return _joined(formulas.And, [_joined(formulas.Or, each) for each in ways])
 
     def event_of(self, kind: str, thing: ast.expr) -> formulas.EventPattern:
         text = self.value(thing, self.types[kind][self.recordings[kind].text])
@@ -158,9 +154,8 @@ class _Parser(FormulaSource):
     def test(self, node: ast.Call, function: ast.Attribute) -> formulas.Test:
         name = function.attr
         if name in SCOPE_NAMES:
-            raise self.error(
-                function, f"{name} is a scope and must be followed by a test such as .Exists(...)"
-            )
+            problem = f"{name} is a scope and must be followed by a test such as .Exists(...)"
+            raise self.error(function, problem)
         if name not in TESTS:
             raise self.unknown(function, "test", name, [*TESTS, *SCOPE_NAMES])
         kind, scopes = TESTS[name], self.scopes(function.value)
@@ -212,9 +207,8 @@ class _Parser(FormulaSource):
                 (text,) = self.arguments(node, node, kind, 1)
                 return formulas.EventPattern(self.look, self.matched(text), found=LOOK_RESULTS[kind])
             case ast.Call(ast.Name(kind)):
-                raise self.unknown(
-                    node, "element", kind, [*self.recordings, *QUESTIONS, *LOOK_RESULTS, *WRAPPED_FIELDS]
-                )
+                known = [*self.recordings, *QUESTIONS, *LOOK_RESULTS, *WRAPPED_FIELDS]
+                raise self.unknown(node, "element", kind, known)
         raise self.expected('an element such as goto("lobby")', node)
 
     def plain_element(self, kind: str, node: ast.Call) -> formulas.EventPattern:
@@ -317,9 +311,8 @@ class _Parser(FormulaSource):
         match node:
             case ast.Constant(str(pattern)):
                 if "\b" in pattern:
-                    raise self.error(
-                        node, 'the string contains a backspace; write r"..." so that \\b is a word boundary'
-                    )
+                    mend = 'write r"..." so that \\b is a word boundary'
+                    raise self.error(node, f"the string contains a backspace; {mend}")
                 if self.sets is not None:
                     pattern = SET_TAG.sub(lambda tag: self.alternation(tag, node), pattern)
                 self.check_regex(node, pattern, compile_regex, "the string is not a valid regex")

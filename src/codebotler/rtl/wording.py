@@ -94,7 +94,9 @@ def _describe_object(element: EventPattern, thing: str) -> str:
 
 
 def _name_or_describe(text: TextPattern, thing: str) -> str:
-    return _quote_choices(text) or _describe_thing(text, thing)
+    """Quote the texts that a regex finds, or describe the thing if they are unlimited or unknown."""
+    names = _words_of(text.pattern) if isinstance(text, Regex) and not is_any(text) else ""
+    return names or _describe_thing(text, thing)
 
 
 def _describe_thing(text: TextPattern, thing: str) -> str:
@@ -102,11 +104,6 @@ def _describe_thing(text: TextPattern, thing: str) -> str:
     if isinstance(text, Number | Time):
         return describe_text(text).removeprefix("with ")
     return f"{thing} {describe_text(text)}".rstrip()
-
-
-def _quote_choices(text: TextPattern) -> str:
-    """Quote the texts that a regex finds, or return an empty text if they are unlimited or unknown."""
-    return _words_of(text.pattern) if isinstance(text, Regex) and not is_any(text) else ""
 
 
 def _words_of(pattern: str) -> str:

@@ -59,11 +59,8 @@ def _lint_sampled(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:
     Absent people are not reported, because requirements are generated for the people present.
     """
     different = [*{frozenset(r.formula for r in w.require): w for w in reversed(worlds)}.values()]
-    first = {
-        requirement.text: (world, requirement)
-        for world in worlds[::-1]
-        for requirement in world.require[::-1]
-    }
+    required = [(world, requirement) for world in worlds for requirement in world.require]
+    first = {requirement.text: (world, requirement) for world, requirement in reversed(required)}
     for world, requirement in first.values():
         yield from world.dead_regexes(requirement)
     implied: dict[int | None, Finding] = {}

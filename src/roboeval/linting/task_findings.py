@@ -86,10 +86,9 @@ def _unworded(task: Task) -> Iterator[Finding]:
     }
     for check in task.checks:
         if check.name in unclear:
-            message = (
-                f'a regex of the check "{check.name}" cannot be described; add its meaning under "means"'
-            )
-            yield Finding("unworded", check.name, message, task.path, check.line)
+            message = f'a regex of the check "{check.name}" cannot be described'
+            mend = 'add its meaning under "means"'
+            yield Finding("unworded", check.name, f"{message}; {mend}", task.path, check.line)
 
 
 def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
@@ -117,9 +116,8 @@ def _why(failed: Failure, judged: Verdicts) -> str:
 
 def _by_some_prompt(verdicts: Verdicts, prompts: int) -> Failure | None:
     """Return the failure of a program, or None if the program satisfies at least one prompt."""
-    failures = [
-        failure_of_verdicts([verdict.on(prompt) for verdict in verdicts]) for prompt in range(prompts)
-    ]
+    by_prompt = ([verdict.on(prompt) for verdict in verdicts] for prompt in range(prompts))
+    failures = [*map(failure_of_verdicts, by_prompt)]
     return None if None in failures else failures[0]
 
 

@@ -55,10 +55,8 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     folder = suite_folder(name)
     suite = read_suite(folder, skills)
     if suite.name != name and not (Path(name) / "suite.yaml").is_file():
-        sentence = (
-            f'the suite is named "{suite.name}", but its package calls it "{name}"; use the same name in both'
-        )
-        raise YamlFile.read(folder / "suite.yaml").wrong(sentence, "name")
+        sentence = f'the suite is named "{suite.name}", but its package calls it "{name}"'
+        raise YamlFile.read(folder / "suite.yaml").wrong(f"{sentence}; use the same name in both", "name")
     return suite
 
 

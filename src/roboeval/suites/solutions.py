@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import chain
 from pathlib import Path
 
 from codebotler.core.world_file import Name, YamlText
@@ -35,13 +36,8 @@ def solutions(task: Task) -> tuple[Solution, ...]:
     folders = [task.path.parents[1], *([LENDING_SUITE] if task.borrows else [])]
     distinct: dict[str, Solution] = {}
     for form in (_read(folder, task) for folder in folders):
-        recorded = (
-            one
-            for model in RECORDED_NAMES
-            for recording in form.recorded
-            for one in recording.replies_of(model)
-        )
-        for solution in (*recorded, *form.programs):
+        replies = (each.replies_of(model) for model in RECORDED_NAMES for each in form.recorded)
+        for solution in chain(*replies, form.programs):
             distinct.setdefault(solution.program, solution)
     return tuple(distinct.values())
 

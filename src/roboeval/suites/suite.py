@@ -42,9 +42,8 @@ class HouseRules:
     def __post_init__(self) -> None:
         for rule in self.rules:
             if rule.inside:
-                raise UserError(
-                    f'the rule "{rule.name}" uses "inside", which evaluations do not support; remove the rule'
-                )
+                why = 'uses "inside", which evaluations do not support'
+                raise UserError(f'the rule "{rule.name}" {why}; remove the rule')
 
     @classmethod
     def read(
@@ -53,9 +52,8 @@ class HouseRules:
         """Read a file of house rules. Raise UserError if it is invalid or names a room that `rooms` lacks."""
         rules = read_rules(path, skills, rooms)
         if not of_suite and not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
-            raise UserError(
-                "is not a valid file name for rules; use lower-case letters, digits and dashes", file=path
-            )
+            mend = "use lower-case letters, digits and dashes"
+            raise UserError(f"is not a valid file name for rules; {mend}", file=path)
         return cls("" if of_suite else path.stem, rules, hashlib.sha256(path.read_bytes()).hexdigest())
 
 
@@ -183,9 +181,7 @@ def _build_suite(
         about=head.about,
         settings=head.rules.settings(),
         tasks={task.name: task for task in tasks},
-        digest=_digest(
-            [file, *documents, *(lender for lender in lenders if lender is not None)], tasks, house, own
-        ),
+        digest=_digest([file, *documents, *filter(None, lenders)], tasks, house, own),
         house=house,
         folder=folder,
         worlds=count if is_sampled else None,

@@ -59,9 +59,8 @@ def read_task(
     is_sampled = isinstance(data, dict) and isinstance(data.get("worlds"), dict)
     form = file.validate(SampledTaskFile, data) if is_sampled else file.validate(TaskFile, data)
     if form.name != path.stem:
-        raise file.wrong(
-            f'the task is named "{form.name}", but its file is "{path.name}"; use the same name', "name"
-        )
+        sentence = f'the task is named "{form.name}", but its file is "{path.name}"; use the same name'
+        raise file.wrong(sentence, "name")
     ablation = None
     if isinstance(form, SampledTaskFile):
         reader = _Reader(form, file, skills, _phrases(form, file, words))

@@ -32,9 +32,8 @@ def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # n
         file = code.co_filename.rpartition("/")[2]  # results must not depend on the folder
         where = f"{file}, line {lines[-1] if lines else code.co_firstlineno}"
         said = str(error).replace(type(robot).__name__, "Simulation")
-        raise RobotError(
-            SKILL_FAILED, f"{row.name} failed in {where}: {type(error).__name__}: {said}"
-        ) from error
+        message = f"{row.name} failed in {where}: {type(error).__name__}: {said}"
+        raise RobotError(SKILL_FAILED, message) from error
     asks = [one for one, parameter in zip(given, row.parameters, strict=True) if parameter.is_options]
     if (asks and result not in asks[0]) or not row.returns.fits(result):
         must = "one of the given options" if asks else row.returns.in_words

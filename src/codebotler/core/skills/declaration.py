@@ -160,15 +160,12 @@ class _Declaration:
         first, *names = taken or ("",)
         is_plain = all(p.kind is p.POSITIONAL_OR_KEYWORD and p.default is p.empty for p in taken.values())
         if not taken or not is_plain or value_type(self.annotation(first) or object) is not None:
-            self.wrong(
-                f"{self.name} must take the simulation first, then the arguments of programs without default "
-                "values; write parameters such as (sim: Simulation, door: str)"
-            )
+            must = "must take the simulation first, then the arguments of programs without default values"
+            self.wrong(f"{self.name} {must}; write parameters such as (sim: Simulation, door: str)")
         for name in names:
             if name not in self.does.__annotations__:
-                self.wrong(
-                    f"the parameter {name} of {self.name} has no type; write {name}: str, or another type"
-                )
+                mend = f"write {name}: str, or another type"
+                self.wrong(f"the parameter {name} of {self.name} has no type; {mend}")
         types = [self.type_of(name, f"the type of the parameter {name}") for name in names]
         if NO_VALUE in types:
             self.wrong(f"a parameter of {self.name} cannot be None; use {USABLE}")
@@ -225,17 +222,15 @@ class _Declaration:
         tried = self.options.get("when_tried")
         is_judged = tried is True or (tried is None and (bool(sets) or not clears))
         named = self.options.get("names", "thing")
-        return Recording(
-            event or self.name, text, options, to, named, tried is True, is_judged, more, sets, clears
-        )
+        kind = event or self.name
+        return Recording(kind, text, options, to, named, tried is True, is_judged, more, sets, clears)
 
     def fails(self) -> Mapping[str, str]:
         fails = self.options.get("fails", {})
         for kind in fails:
             if not kind.isidentifier() or iskeyword(kind) or kind == VIOLATION or hasattr(builtins, kind):
-                self.wrong(
-                    f'"{kind}" cannot name an error of {self.name}; choose another name, such as "DoorLocked"'
-                )
+                mend = 'choose another name, such as "DoorLocked"'
+                self.wrong(f'"{kind}" cannot name an error of {self.name}; {mend}')
         return fails
 
     def verb(self, parameters: tuple[Parameter, ...], recording: Recording | None) -> Verb | None:
@@ -246,9 +241,8 @@ class _Declaration:
             names = [each.name for each in parameters]
             if recording is not None:  # in the order of the event
                 names = [name for name in (recording.text, *recording.more) if name]
-            return verb_of(
-                verb, names, self.options.get("results", ("no", "yes")), self.options.get("past", "")
-            )
+            results = self.options.get("results", ("no", "yes"))
+            return verb_of(verb, names, results, self.options.get("past", ""))
         except ValueError as error:
             self.wrong(f"{error}")
 
@@ -258,9 +252,8 @@ class _Declaration:
             return ros
         written = ROS_ACTION.fullmatch(ros)
         if written is None:
-            self.wrong(
-                f'"{ros}" is not a ROS action; write package/Type:/topic, as in lab_msgs/OpenDoor:/open_door'
-            )
+            mend = "write package/Type:/topic, as in lab_msgs/OpenDoor:/open_door"
+            self.wrong(f'"{ros}" is not a ROS action; {mend}')
         unusable = [each.name for each in parameters if not re.fullmatch(r"[a-z][a-z0-9_]*", each.name)]
         if unusable:
             self.wrong(f"the parameter {unusable[0]} of {self.name} cannot be a ROS field; use a-z, 0-9, _")

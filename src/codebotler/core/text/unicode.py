@@ -55,12 +55,8 @@ def long_rows(text: str) -> Iterator[tuple[int, int]]:
         return
     letter = 0  # where the last letter begins
     for at, character in enumerate((*text, " ")):
-        if character.isascii() or not _is_accent(character):
+        # Some characters, such as U+0F73 and U+FF9E, become accents in some normal form.
+        if character.isascii() or not combining(normalize("NFKD", character)[0]):
             if at - letter > MAX_ACCENTS + 1:
                 yield letter, at
             letter = at
-
-
-def _is_accent(character: str) -> bool:
-    """Whether a character is an accent, or becomes accents in some normal form, as U+0F73 and U+FF9E do."""
-    return combining(normalize("NFKD", character)[0]) > 0

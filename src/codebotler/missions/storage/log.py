@@ -142,7 +142,7 @@ def read_events(folder: Path) -> list[LogLine]:
 def read_log(path: Path) -> list[LogLine]:
     """Read the events in a log, without an incomplete last line. Raise UserError if a line is invalid."""
     events = []
-    for number, line in read_rows(path, growing=True):
+    for number, line in read_rows(path):
         if not _is_event(line):
             raise UserError("this line is not a mission event; remove the line", file=path, line=number)
         events.append(line)

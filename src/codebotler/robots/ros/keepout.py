@@ -26,9 +26,8 @@ def keepout_messages(
     zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in patterns)]
     xs, ys = zip(*(corner for zone in zones or [EMPTY_MASK] for corner in zone), strict=True)
     left, bottom = (math.floor(min(each) / MASK_RESOLUTION) * MASK_RESOLUTION for each in (xs, ys))
-    width, height = (
-        math.ceil((max(each) - low) / MASK_RESOLUTION) for each, low in ((xs, left), (ys, bottom))
-    )
+    width = math.ceil((max(xs) - left) / MASK_RESOLUTION)
+    height = math.ceil((max(ys) - bottom) / MASK_RESOLUTION)
     cells = [0] * (width * height)
     for row in range(height):
         for zone in zones:

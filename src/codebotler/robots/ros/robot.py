@@ -159,9 +159,8 @@ class RosRobot(RosCaller):
         """Return the place that the robot is in, or else the nearest place, whose distance is reported."""
         pose = self._pose()
         if pose is None or (self._worker is not None and self._worker.motion.is_unseen):
-            raise RobotError(
-                "UnknownPose", f"no pose has arrived on {self.connection.pose} since the robot moved"
-            )
+            message = f"no pose has arrived on {self.connection.pose} since the robot moved"
+            raise RobotError("UnknownPose", message)
         within = places.room_at(pose.x, pose.y)
         if within is not None:
             return within

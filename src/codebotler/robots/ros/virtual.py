@@ -96,10 +96,8 @@ class VirtualRobot:
             thread.join(LISTEN_SECONDS)
 
     def _start_servers(self) -> RosWorker:
-        start: WorkerMessage = {
-            "node": VIRTUAL_NODE,
-            "actions": calls_data(default_connection(self._body.skills)),
-        }
+        actions = calls_data(default_connection(self._body.skills))
+        start: WorkerMessage = {"node": VIRTUAL_NODE, "actions": actions}
         if self._ros == 1:
             where = urlsplit(self.address)
             port = start["port"] = where.port if where.hostname in LOOPBACK_HOSTS else None

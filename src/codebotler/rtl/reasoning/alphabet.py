@@ -58,34 +58,21 @@ def alphabet(
     held = _held([element.holding for alike in kinds.values() for element in alike])
     events: list[Event] = []
     for kind, alike in kinds.items():
-        moves_by = moves if kind == GOTO else None
+        is_listed = kind == GOTO and moves is not None
+        texts = (moves or ()) if is_listed else distinct_strings(_distinct(e.text for e in alike))
+        answers = _texts([e.answer for e in alike])
+        results = (None,) if all(e.found is None for e in alike) else (True, False)
+        here = places if kind != GOTO or any(e.place for e in alike) else [""]
+        things = held if any(e.holding for e in alike) else [""]
+        people = _texts([e.to for e in alike])[any(e.to for e in alike) :]  # every question has an addressee
+        said = product(texts, _more(alike), _options(alike))
         aspects = [
-            [
-                Event(kind, text, options, more=more)
-                for text in (
-                    moves_by if moves_by is not None else distinct_strings(_distinct(e.text for e in alike))
-                )
-                for more in _more(alike)
-                for options in _options(alike)
-            ],
-            [
-                Event(kind, "", answer=answer, found=found)
-                for answer in _texts([element.answer for element in alike])
-                for found in ([None] if all(e.found is None for e in alike) else [True, False])
-            ],
-            [
-                Event(kind, "", place=place)
-                for place in (places if kind != GOTO or any(e.place for e in alike) else [""])
-            ],
-            [
-                Event(kind, "", holding=holding, to=to)
-                for holding in (held if any(e.holding for e in alike) else [""])
-                for to in _texts([e.to for e in alike])[
-                    any(e.to for e in alike) :
-                ]  # every question has an addressee
-            ],
+            [Event(kind, text, options, more=more) for text, more, options in said],
+            [Event(kind, "", answer=answer, found=found) for answer, found in product(answers, results)],
+            [Event(kind, "", place=place) for place in here],
+            [Event(kind, "", holding=holding, to=to) for holding, to in product(things, people)],
         ]
-        events += _distinct_events(alike, aspects, by_room=rooms is not None, by_text=moves_by is not None)
+        events += _distinct_events(alike, aspects, by_room=rooms is not None, by_text=is_listed)
     return events
 
 

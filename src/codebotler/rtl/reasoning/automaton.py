@@ -55,9 +55,8 @@ class Automaton:
             number = {behaviour: index for index, behaviour in enumerate(dict.fromkeys(behaviours))}
             groups = [number[behaviour] for behaviour in behaviours]
         firsts = [groups.index(group) for group in range(before)]
-        return cls(
-            tuple(tuple(groups[to] for to in rows[s]) for s in firsts), tuple(accepts[s] for s in firsts)
-        )
+        merged = (tuple(groups[to] for to in rows[state]) for state in firsts)
+        return cls(tuple(merged), tuple(accepts[state] for state in firsts))
 
     @cached_property
     def always(self) -> Automaton:

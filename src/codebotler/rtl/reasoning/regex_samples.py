@@ -110,9 +110,8 @@ def _spell_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN
 def _characters(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - private classes of `re`
     """Return some characters of a set, literal ones first, or only one if the set contains nearly all."""
     parser = import_module("re._parser")
-    one = import_module("re._compiler").compile(
-        parser.SubPattern(parser.State(), [(op, arguments)]), PATTERN_FLAGS
-    )
+    node = parser.SubPattern(parser.State(), [(op, arguments)])
+    one = import_module("re._compiler").compile(node, PATTERN_FLAGS)
     members = arguments if str(op) == "IN" else []
     codes = [codes for kind, codes in members if str(kind) in {"LITERAL", "RANGE"}]
     ends = [chr(end) for each in codes for end in (each if isinstance(each, tuple) else (each,))]

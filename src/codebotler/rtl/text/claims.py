@@ -140,10 +140,8 @@ class Time(Matcher):
     other: bool = False
 
     def _matches(self, text: str) -> bool:
-        named = times_in(text)
-        inside = [
-            any(self._minutes[0] <= time <= self._minutes[1] for time in readings) for readings in named
-        ]
+        start, end = self._minutes
+        inside = [any(start <= time <= end for time in readings) for readings in times_in(text)]
         return not all(inside) if self.other else bool(inside) and all(inside)
 
     @cached_property
@@ -181,10 +179,7 @@ class Claim(Matcher):
 
     def _matches(self, text: str) -> bool:
         wanted = Polarity.DENIES if self.denied else Polarity.AFFIRMS
-        return any(
-            found is wanted and self.compiled.search(clause) is not None
-            for clause, found in _polarities(text)
-        )
+        return any(self.compiled.search(clause) for clause, found in _polarities(text) if found is wanted)
 
     def __str__(self) -> str:
         return f"{'denies' if self.denied else 'affirms'}({quote(self.pattern)})"

@@ -92,9 +92,8 @@ def _is_ignored(match: re.Match[str], text: str) -> bool:
 
 def _is_pronoun(match: re.Match[str], before: str) -> bool:
     """Whether `one` is a pronoun, as in `some one` and `would take one`."""
-    return _PRONOUN.search(before) is not None or (
-        _TAKES.search(before) is not None and _LAST.match(match.string, match.end()) is not None
-    )
+    is_last = _LAST.match(match.string, match.end()) is not None
+    return _PRONOUN.search(before) is not None or (is_last and _TAKES.search(before) is not None)
 
 
 def _value(match: re.Match[str]) -> float:

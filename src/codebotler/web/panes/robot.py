@@ -51,7 +51,7 @@ class RobotPane:
             self._where = PlainText("p", "", "quiet")
             self._asking = None if console.face is None else QuestionPane(console.face)
             self._reason = PlainText("p", "", "reason")
-            self._warning = PlainText("p", "", "trouble").props("role=alert")
+            self._warning = PlainText("p", "", "lost").props("role=alert")
             self._continue = ContinueButton(console, model=model)
             self._map = ui.html("", sanitize=False).classes("map")
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')

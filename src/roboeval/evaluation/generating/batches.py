@@ -140,9 +140,8 @@ def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:
     if not batches(about):
         raise UserError("was not started by `roboeval generate --requests`; use another run", file=run.path)
     if about.get("suite") != suite.name:
-        raise UserError(
-            f'belongs to the suite "{about.get("suite")}"; select that suite with --suite', file=run.path
-        )
+        sentence = f'belongs to the suite "{about.get("suite")}"; select that suite with --suite'
+        raise UserError(sentence, file=run.path)
     return about
 
 

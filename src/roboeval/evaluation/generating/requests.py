@@ -81,10 +81,9 @@ class GenerationPlan:
             return
         for completion in read_completions(run.completions, self.suite):
             if completion.instruction != self.instruction(completion.key):
-                which = f"{name_of(completion.key)} was generated from a different instruction"
-                raise UserError(
-                    f"{which} than the suite's current one; name another folder", file=run.completions
-                )
+                why = "was generated from a different instruction than the suite's current one"
+                sentence = f"{name_of(completion.key)} {why}; name another folder"
+                raise UserError(sentence, file=run.completions)
             yield completion
 
 
@@ -152,11 +151,8 @@ def _run_metadata(
     elif run.completions.exists() and run.completions.stat().st_size:
         why = "is missing, so the settings of the completions are unknown"
         raise UserError(f"{why}; name another folder", file=run.about)
-    return {
-        **fixed,
-        "batches": batches(earlier),
-        "possibly_paid_twice": earlier.get("possibly_paid_twice", 0),
-    }
+    paid_twice = earlier.get("possibly_paid_twice", 0)
+    return {**fixed, "batches": batches(earlier), "possibly_paid_twice": paid_twice}
 
 
 def _recorded(settings: SamplingSettings) -> dict[str, Any]:
@@ -265,7 +261,7 @@ class RequestLog:
 
     def _read(self) -> set[CompletionKey]:
         pending: set[CompletionKey] = set()
-        for number, row in read_rows(self.path, growing=True) if self.path.exists() else ():
+        for number, row in read_rows(self.path) if self.path.exists() else ():
             match row:
                 case {"sent": [str(task), int(prompt), int(index)]}:
                     pending.add((task, prompt, index))

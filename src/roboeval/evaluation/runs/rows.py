@@ -191,7 +191,7 @@ def take_judged(left: dict[CompletionKey, Completion], line: LocatedRow, file: P
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
     """Yield the task and hash of each checked program, with its problems in sentences, if there are any."""
-    for number, row in read_rows(path, growing=True):
+    for number, row in read_rows(path):
         match row:
             case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
                 yield (task, program), problems

@@ -21,7 +21,7 @@ class TurnLog:
 
     def __init__(self, path: Path, done: Collection[CompletionKey]) -> None:
         self._replies: dict[CompletionKey, list[Reply]] = {}
-        for number, row in read_rows(path, growing=True) if path.exists() else ():
+        for number, row in read_rows(path) if path.exists() else ():
             try:
                 if (key := key_of(row)) not in done:
                     self._replies.setdefault(key, []).append(msgspec.convert(row["reply"], Reply))

@@ -16,7 +16,6 @@ from pydantic import Field
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_text
-from codebotler.core.skills.paper import SKILLS
 from codebotler.core.text.words import listed
 from codebotler.core.world_file import Name, YamlText
 from codebotler.core.yaml_files import YamlFile
@@ -166,19 +165,11 @@ def _generate(family: str, seed: int, worlds: int) -> GeneratedTask:
         content["prompts"] = [*_phrasings(template, chosen, random)]
     task_file = file.part("task", content)
     head = suite_file()
-    rules = head.rules
-    task = _forbid_retraction(
-        read_task(
-            task_file,
-            path.with_name(f"{name}.yaml"),
-            SKILLS,
-            count=worlds,
-            seed=seed,
-            words=rules.words_for_people,
-        )
-    )
+    words = head.rules.words_for_people
+    task = read_task(task_file, path.with_name(f"{name}.yaml"), count=worlds, seed=seed, words=words)
     digest = hashlib.sha256(f"{head.version} {worlds} {seed} {task_file.data}".encode()).hexdigest()
-    suite = Suite(TRAINING_SUITE, head.version, head.about, rules.settings(), {name: task}, digest)
+    tasks = {name: _forbid_retraction(task)}
+    suite = Suite(TRAINING_SUITE, head.version, head.about, head.rules.settings(), tasks, digest)
     return GeneratedTask(suite, name, form.solution, form.wrong)
 
 
@@ -187,7 +178,7 @@ def _forbid_retraction(task: Task) -> Task:
 
     A separate requirement would already hold at the start and so reward incorrect programs.
     """
-    no_retraction = parse(f'not tr.Exists(say(r"{RETRACTION}"))', skills=SKILLS)
+    no_retraction = parse(f'not tr.Exists(say(r"{RETRACTION}"))')
 
     def strict(one: Requirement) -> Requirement:
         return replace(one, formula=And((one.formula, no_retraction)))
@@ -213,9 +204,8 @@ def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
         elif match := NUMBER_RANGE.fullmatch(choice):
             least, most = int(match[1]), int(match[2])
             if not least <= most < len(NUMBER_WORDS):
-                raise file.wrong(
-                    "the range is not valid; write ascending numbers up to 10, such as 2 to 4", "choose", name
-                )
+                mend = "write ascending numbers up to 10, such as 2 to 4"
+                raise file.wrong(f"the range is not valid; {mend}", "choose", name)
             number = random.randint(least, most)
             yield from ((name, str(number)), (f"{name}_word", NUMBER_WORDS[number]))
         elif match := SEVERAL_WORDS.fullmatch(choice):
@@ -264,9 +254,8 @@ def _phrasings(template: _Template, chosen: Mapping[str, str], random: Random) -
         filled = _fill(prompt, chosen, template.path)
         text = " ".join(SYNONYMS.sub(lambda match: random.choice(match[1].split("|")), filled).split())
         if "{" in text or "}" in text:
-            raise template.file.wrong(
-                "braces are not balanced; write synonyms as {go|drive}", "task", "prompts", number
-            )
+            sentence = "braces are not balanced; write synonyms as {go|drive}"
+            raise template.file.wrong(sentence, "task", "prompts", number)
         yield text
 
 

@@ -76,9 +76,8 @@ def evaluate(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - strings, nu
 def _checked_value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - as `evaluate`
     found = _compute(node, names)
     if _size(found) > MAX_VALUE_SIZE:
-        raise ExpressionError(
-            f'"{ast.unparse(node)}" exceeds {MAX_VALUE_SIZE:,} characters, digits or entries; simplify it'
-        )
+        limit = f"{MAX_VALUE_SIZE:,} characters, digits or entries"
+        raise ExpressionError(f'"{ast.unparse(node)}" exceeds {limit}; simplify it')
     return found
 
 

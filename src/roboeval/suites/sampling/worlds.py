@@ -117,9 +117,8 @@ class WorldSampler:
             named = fnmatch.filter(self.factors, pattern)
             anywhere = level in (*self.form.worlds.rooms, IN_NO_ROOM)
             may_be_anywhere = anywhere and (len(named) == 1 or level == IN_NO_ROOM)
-            fitting = [
-                f for f in named if level in self.factors[f] or (may_be_anywhere and f.endswith(".in"))
-            ]
+            places = [factor for factor in named if may_be_anywhere and factor.endswith(".in")]
+            fitting = [factor for factor in named if level in self.factors[factor] or factor in places]
             if not fitting:
                 known = ", ".join(self._free)
                 sentence = f'no factor that matches "{pattern}" can be "{level}"; the factors are {known}'
@@ -243,9 +242,8 @@ def _format_call(node: ast.expr, names: Names) -> str:
         case ast.Name(name):
             return name
         case ast.Call(ast.Name(name), arguments, []):
-            return (
-                f"{name}({', '.join(_format_argument(evaluate(argument, names)) for argument in arguments)})"
-            )
+            given = [_format_argument(evaluate(argument, names)) for argument in arguments]
+            return f"{name}({', '.join(given)})"
     raise ExpressionError(f'"{ast.unparse(node)}" is not a requirement; write check(x) or not check(x)')
 
 

@@ -231,10 +231,10 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
 @pytest.mark.parametrize(
     ("name", "value", "what"),
     [
-        ("digest", "0" * 64, "digest was"),
-        ("python", "2.7", 'python was "2.7" and is now "3.'),
-        ("codebotler", "0.0.1", 'codebotler was "0.0.1" and is now '),
-        ("ablation", True, "ablation was true and is now false"),
+        ("digest", "0" * 64, '"digest" was'),
+        ("python", "2.7", '"python" was "2.7" and is now "3.'),
+        ("codebotler", "0.0.1", '"codebotler" was "0.0.1" and is now '),
+        ("ablation", True, '"ablation" was true and is now false'),
     ],
 )
 def test_an_evaluation_by_other_versions_is_refused_unless_redone(

@@ -14,20 +14,19 @@ from codebotler.robots.places import Places, read_places
 from codebotler.robots.ros.connections.connection import CALL_VARIABLE, PLACE_VARIABLES, Connection, SkillCall
 
 
-def _check_topic(text: str) -> str:
-    if not re.fullmatch(r"~?/?\w+(/\w+)*", text):
-        raise ValueError("must be a ROS name, such as /navigate_to_pose")
-    return text
+def _expect(pattern: str, what: str) -> AfterValidator:
+    def check(text: str) -> str:
+        if not re.fullmatch(pattern, text):
+            raise ValueError(f"must be {what}")
+        return text
+
+    return AfterValidator(check)
 
 
-def _check_type(text: str) -> str:
-    if not re.fullmatch(r"\w+/((action|srv|msg)/)?\w+", text):
-        raise ValueError("must be a type with its package, such as std_msgs/msg/String")
-    return text
-
-
-Topic = Annotated[str, Field(strict=True), AfterValidator(_check_topic)]
-Type = Annotated[str, Field(strict=True), AfterValidator(_check_type)]
+ROS_NAME = _expect(r"~?/?\w+(/\w+)*", "a ROS name, such as /navigate_to_pose")
+ROS_TYPE = _expect(r"\w+/((action|srv|msg)/)?\w+", "a type with its package, such as std_msgs/msg/String")
+Topic = Annotated[str, Field(strict=True), ROS_NAME]
+Type = Annotated[str, Field(strict=True), ROS_TYPE]
 
 
 class _ConnectionPart(BaseModel):

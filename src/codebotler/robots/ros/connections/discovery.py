@@ -64,19 +64,15 @@ def discover_offers(address: str, python: Path) -> list[str]:
     worker = RosWorker(choose_python(python), "discovery_worker.py", {}, {"ROS_DOMAIN_ID": domain})
     worker.leave()
     if not worker.about["offers"]:
-        raise NotReadyError(
-            f"no node was found with ROS_DOMAIN_ID {domain}; start the robot, or set another --address"
-        )
+        mend = "start the robot, or set another --address"
+        raise NotReadyError(f"no node was found with ROS_DOMAIN_ID {domain}; {mend}")
     return [" ".join(offer) for offer in worker.about["offers"]]
 
 
 def draft_connection(offers: Iterable[str]) -> str:
     """Return a draft of a `--connect` file for offers. Lines to complete and unused offers are comments."""
-    known = [
-        offer
-        for offer in sorted(offers)
-        if re.fullmatch(r"\w+ [\w/]+ [\w/]+", offer) and not INTERNAL_OFFERS.fullmatch(offer)
-    ]
+    valid = filter(re.compile(r"\w+ [\w/]+ [\w/]+").fullmatch, sorted(offers))
+    known = [offer for offer in valid if not INTERNAL_OFFERS.fullmatch(offer)]
     rest = {offer.partition(" ")[2] for offer in known}
     ready: set[str] = set()
     lines: list[tuple[bool, str]] = []  # the lines of the draft, and whether each defines a skill
@@ -89,16 +85,14 @@ def draft_connection(offers: Iterable[str]) -> str:
             ready |= set() if why else {key}
             lines.append((key not in NOT_SKILLS, f"# {line}  # {why}" if why else line))
             rest.discard(f"{name} {kind}")
-    return "".join(
-        f"{line}\n"
-        for line in (
-            "# A draft of `codebotler connect --discover`; read each line before you use it.",
-            "robot: ros2",
-            "# places: places.yaml",
-            *(line for is_skill, line in lines if not is_skill),
-            "skills:",
-            *(f"  {line}" for is_skill, line in lines if is_skill),
-            *(["# Not mapped:"] if rest else []),
-            *(f"#   {offer}" for offer in sorted(rest)),
-        )
-    )
+    draft = [
+        "# A draft of `codebotler connect --discover`; read each line before you use it.",
+        "robot: ros2",
+        "# places: places.yaml",
+        *(line for is_skill, line in lines if not is_skill),
+        "skills:",
+        *(f"  {line}" for is_skill, line in lines if is_skill),
+        *(["# Not mapped:"] if rest else []),
+        *(f"#   {offer}" for offer in sorted(rest)),
+    ]
+    return "".join(f"{line}\n" for line in draft)

@@ -185,10 +185,8 @@ class SkillWorker:
         deadline = time.monotonic() + self.patience
         present = [server for server in self.servers.values() if self.graph.nodes_of(server.name)]
         # Ask all servers in each round, because a server's first call starts the timer for its connection.
-        while (
-            sum(s.is_connected(self.silence) for s in present) < len(present) and time.monotonic() < deadline
-        ):
-            if self.graph.has_left():
+        while sum(server.is_connected(self.silence) for server in present) < len(present):
+            if time.monotonic() >= deadline or self.graph.has_left():
                 break
             time.sleep(0.005)
 

@@ -35,10 +35,8 @@ class Ros1Graph:
         deadline = time.monotonic() + ROS1_EXIT_SECONDS
         while (address := self.address_of(self.node)) is not None and is_alive(address):
             if time.monotonic() > deadline:
-                raise SetupError(
-                    f"another codebotler is using this robot (the node {self.node} at {address}); "
-                    "stop it first"
-                )
+                where = f"the node {self.node} at {address}"
+                raise SetupError(f"another codebotler is using this robot ({where}); stop it first")
             time.sleep(0.1)
         name = self.node.rpartition("/")[2]
         rospy.init_node(name, argv=[], disable_signals=True, log_level=rospy.FATAL, anonymous=False)
@@ -80,9 +78,8 @@ class Ros1Graph:
         """Return the names of nodes registered for an action, a topic or a service, even if they are dead."""
         _, subscribers, services = self._master.getSystemState()
         name = self._rosgraph.names.resolve_name(server, self.node)
-        return [
-            node for one, nodes in subscribers + services if one in {name, name + "/goal"} for node in nodes
-        ]
+        names = {name, name + "/goal"}
+        return [node for one, nodes in subscribers + services if one in names for node in nodes]
 
     def has_publisher(self, topic: str) -> bool:
         """Return whether a publisher is registered for a topic."""

@@ -57,10 +57,9 @@ class Ros1Server(Server):
         )
         if results is not self._results:
             self._results, self._since = results, time.monotonic()
-        is_reached = all(p.impl.has_connection(node) for p in (client.pub_goal, client.pub_cancel))
-        return (
-            is_reached and None not in (results, feedback) and time.monotonic() - self._since > RESULT_DELAY
-        )
+        if results is None or feedback is None or time.monotonic() - self._since <= RESULT_DELAY:
+            return False
+        return all(p.impl.has_connection(node) for p in (client.pub_goal, client.pub_cancel))
 
     def cancel(self, goal_id: str = "") -> None:
         """Cancel one goal, or all goals of all clients if `goal_id` is empty.

@@ -72,10 +72,8 @@ def message_types(
             continue
         if not all(definitions.values()):
             if package not in sources:
-                raise SetupError(
-                    f"the ROS 2 package {package} is not installed; "
-                    "source its workspace, or list its folder in packages"
-                )
+                mend = "source its workspace, or list its folder in packages"
+                raise SetupError(f"the ROS 2 package {package} is not installed; {mend}")
             definitions.update(_definitions(sources[package], [*definitions]))
         sys.path.insert(0, str(build_package(package, definitions, tell)))
         importlib.invalidate_caches()
@@ -140,9 +138,8 @@ def _definitions(folder: Path, wanted: list[str]) -> Definitions:
             found[name] = path.read_text(encoding="utf-8")
         except OSError:
             raise SetupError(f"there is no file {path}; complete the folder of {folder.name}") from None
-        uses = {
-            f"msg/{used}" for package, used in USED_TYPE.findall(found[name]) if package in {"", folder.name}
-        }
+        types = USED_TYPE.findall(found[name])
+        uses = {f"msg/{used}" for package, used in types if package in {"", folder.name}}
         wanted += sorted(uses - {*found, *wanted})
     return found
 
@@ -153,9 +150,8 @@ def _import_class(name: str) -> Any:
         return getattr(importlib.import_module(f"{package}.{kind}"), plain)
     except (AttributeError, ModuleNotFoundError):
         where = Path(importlib.import_module(package).__file__ or "").parent
-        raise SetupError(
-            f"{package} in {where} has no {kind} {plain}; add {plain}.{kind} and build the package again"
-        ) from None
+        mend = f"add {plain}.{kind} and build the package again"
+        raise SetupError(f"{package} in {where} has no {kind} {plain}; {mend}") from None
 
 
 def _check_action(name: str, definition: str) -> Any:
@@ -185,9 +181,8 @@ def build_package(package: str, definitions: Definitions, tell: ProgressListener
     try:
         shares = {name: Path(share(name)) for name in (*needed, *("rosidl_" + name for name in GENERATORS))}
     except PackageNotFoundError as error:
-        raise SetupError(
-            f"{package} needs the ROS 2 package {error}, which is not installed; source its workspace"
-        ) from None
+        lacks = f"needs the ROS 2 package {error}, which is not installed"
+        raise SetupError(f"{package} {lacks}; source its workspace") from None
     versions = [(folder / "package.xml").read_text() for folder in shares.values()]
     parts = [package, definitions, sysconfig.get_config_var("SOABI"), versions, Path(__file__).read_text()]
     key = hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
@@ -197,10 +192,8 @@ def build_package(package: str, definitions: Definitions, tell: ProgressListener
         return folder
     missing = [name for name in COMPILERS.values() if shutil.which(name) is None]
     if missing:
-        raise SetupError(
-            f"{package} must be compiled once, but there is no {missing[0]}; "
-            f"install g++, or build {package} with colcon and source it"
-        )
+        mend = f"install g++, or build {package} with colcon and source it"
+        raise SetupError(f"{package} must be compiled once, but there is no {missing[0]}; {mend}")
     tell(f"building the ROS 2 messages of {package} once; this takes half a minute")
     home.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=str(home)) as temporary:
@@ -224,9 +217,8 @@ class _Build:
 
     def make(self, definitions: Definitions) -> None:
         (self.made / "msg").mkdir(parents=True)
-        (self.made / "__init__.py").write_text(
-            PRELOAD_CODE.format(package=self.package, supports=TYPE_SUPPORTS)
-        )
+        preload = PRELOAD_CODE.format(package=self.package, supports=TYPE_SUPPORTS)
+        (self.made / "__init__.py").write_text(preload)
         self._generate(definitions)
         module = f"{self.package}_s__rosidl_typesupport_c{sysconfig.get_config_var('EXT_SUFFIX')}"
         includes = [argument for folder in self._includes() for argument in ("-I", str(folder))]
@@ -298,6 +290,5 @@ class _Build:
         if done.returncode:
             lines: Sequence[str] = done.stdout.splitlines() or [""]
             error = next((line for line in lines if "error" in line), lines[-1])
-            raise SetupError(
-                f"{self.package} could not be compiled ({error.strip()}); is python3-dev installed?"
-            )
+            why = f"{self.package} could not be compiled ({error.strip()})"
+            raise SetupError(f"{why}; is python3-dev installed?")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -195,9 +196,8 @@ class Ros2Worker(SkillWorker):
         goal.sent = time.monotonic()
         if not isinstance(goal.server, Ros2Server):
             goal.is_acknowledged = True
-            self.graph.call_soon(
-                goal.server.perform, message, lambda values: self.finish(goal, "succeeded", values)
-            )
+            end = partial(self.finish, goal, "succeeded")
+            self.graph.call_soon(goal.server.perform, message, end)
             return
         goal.handle = Ros2Goal()
         goal.stop = lambda: self.graph.call_soon(self._cancel, goal)
@@ -215,18 +215,12 @@ class Ros2Worker(SkillWorker):
     def check_goal(self, goal: Goal, sent: float, now: float) -> None:
         """Check a goal, and repeat requests: a cancel can overtake its goal, and an answer can get lost."""
         super().check_goal(goal, sent, now)
-        if goal.is_over or goal.handle is None:  # calls of services and topics have no handle
+        handle, cancelled, ended = goal.handle, goal.cancelled, goal.status_ended
+        if goal.is_over or handle is None:  # calls of services and topics have no handle
             return
-        if (
-            goal.cancelled is not None
-            and not goal.handle.is_cancelling
-            and now - goal.cancelled > WATCH_SECONDS
-        ):
+        if cancelled is not None and not handle.is_cancelling and now - cancelled > WATCH_SECONDS:
             self.graph.call_soon(self._cancel, goal)
-        if (
-            goal.status_ended is not None
-            and now - max(goal.status_ended, goal.handle.result_request) > RESULT_SECONDS
-        ):
+        if ended is not None and now - max(ended, handle.result_request) > RESULT_SECONDS:
             self.graph.call_soon(self._request_result, goal)
 
     def _send(self, goal: Goal, message: Any) -> None:
@@ -273,9 +267,8 @@ class Ros2Worker(SkillWorker):
         client = goal.server.client
         accepted = goal.server.spec.Impl.SendGoalService.Response(accepted=True)
         handle = ClientGoalHandle(client, UUID(uuid=goal.handle.uuid), accepted)
-        client._get_result_async(handle).add_done_callback(
-            lambda done: self._finish_goal(goal, done.result())
-        )
+        answer = client._get_result_async(handle)
+        answer.add_done_callback(lambda done: self._finish_goal(goal, done.result()))
 
     def _cancel(self, goal: Goal) -> None:
         answer = goal.server.request_cancel(goal.handle.uuid)

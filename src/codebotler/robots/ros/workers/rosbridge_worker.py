@@ -65,10 +65,8 @@ class RosbridgeWorker(SkillWorker):
         try:
             self.graph = RosbridgeConnection(start["address"], actions, self._hear, self._lost)
         except CONNECTION_FAULTS as error:
-            raise SetupError(
-                f"no rosbridge answers at {start['address']} ({error}); start it, "
-                "or name another with --address"
-            ) from None
+            mend = "start it, or name another with --address"
+            raise SetupError(f"no rosbridge answers at {start['address']} ({error}); {mend}") from None
         self.servers = {skill: RosbridgeServer(self.graph, call) for skill, call in calls.items()}
         self._message: Fields = {}
         self._again = 0.0

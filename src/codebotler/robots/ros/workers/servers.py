@@ -30,13 +30,8 @@ class ActionServers:
         specs = action_types(list(start["actions"].values()))
         self.servers: list[Any] = []
         for skill, action in start["actions"].items():
-            server = actionlib.ActionServer(
-                action["server"],
-                specs[action["type"]],
-                self._make_callback(skill),
-                self._cancel,
-                auto_start=False,
-            )
+            name, spec, start_goal = action["server"], specs[action["type"]], self._make_callback(skill)
+            server = actionlib.ActionServer(name, spec, start_goal, self._cancel, auto_start=False)
             server.start()
             self.servers.append(server)
         channel.send("ready", has_master=self.master is not None)
@@ -87,10 +82,8 @@ def start_master(port: int | None, uri: str) -> Any:
         try:
             probe.bind(("127.0.0.1", port))
         except OSError as error:
-            raise SetupError(
-                f"port {port} is in use by something that is not a ROS master ({error}); "
-                "name another port in ROS_MASTER_URI"
-            ) from None
+            why = f"port {port} is in use by something that is not a ROS master ({error})"
+            raise SetupError(f"{why}; name another port in ROS_MASTER_URI") from None
     master = rosmaster.master.Master(port)
     master.start()
     return master
