@@ -259,8 +259,8 @@ def test_one_press_calls_stop_once(write: Write, tmp_path: Path) -> None:
 """
     )
     mission = Mission(tmp_path, robot.name)
-    mission.draft("def task_program():\n    say('a')\n")
-    mission.check([])
+    mission.set_program("def task_program():\n    say('a')\n")
+    mission.record_check([])
     mission.approve()
     with Reservation(robot, tmp_path) as reserved, mission, ThreadPoolExecutor() as threads:
         run = threads.submit(mission.run, reserved)
