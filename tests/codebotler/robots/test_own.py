@@ -254,8 +254,9 @@ def test_one_press_calls_stop_once(write: Write, tmp_path: Path) -> None:
     robot = write(
         BASE
         + """
+    speaks = threading.Event()
     def get_current_location(self): return "hall"
-    async def say(self, message): await asyncio.sleep(30)
+    async def say(self, message): self.speaks.set(); await asyncio.sleep(30)
 """
     )
     mission = Mission(tmp_path, robot.name)
@@ -264,7 +265,8 @@ def test_one_press_calls_stop_once(write: Write, tmp_path: Path) -> None:
     mission.approve()
     with Reservation(robot, tmp_path) as reserved, mission, ThreadPoolExecutor() as threads:
         run = threads.submit(mission.run, reserved)
-        time.sleep(0.3)
+        assert robot._body.speaks.wait(SOON)  # type: ignore[attr-defined]  # of a class in a file
+        time.sleep(0.05)
         mission.stop()
         run.result(SOON)
     assert robot._body.stopped == 1  # type: ignore[attr-defined]  # of a class in a file
