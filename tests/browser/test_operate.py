@@ -338,7 +338,7 @@ def test_an_unknown_instruction_leads_to_known_ones(tmp_path: Path, open_page: O
         page.locator("textarea").fill("Go to the lobby.")
         page.get_by_role("button", name="Write the program").click()
         expect(page.locator(".trouble")).to_contain_text("OPENAI_API_KEY")
-        offered = page.locator(".picks", has_text="Similar instructions").locator(".pick")
+        offered = page.locator(".picks", has_text="Instructions it knows").locator(".pick")
         expect(offered).to_have_count(3)
         offered.first.click()
         expect(page.locator("textarea")).to_have_value(offered.first.locator("span").inner_text())

@@ -260,10 +260,12 @@ async def stop(ctx: AgentContext) -> MissionReport:
     Call this whenever anything is wrong, even while another call is waiting.
     """
     gatekeeper = gatekeeper_of(ctx)
-    session = gatekeeper.console.session
-    if gatekeeper.console.stop(agent_name(ctx)) and session is not None:
-        await gatekeeper.console.notifier.until(lambda: session.view.is_over, 15)
-    return gatekeeper.report(session)
+    console, session = gatekeeper.console, gatekeeper.console.session
+    if console.stop(agent_name(ctx)) and session is not None:
+        await console.notifier.until(lambda: session.view.is_over, 15)
+    report, elsewhere = gatekeeper.report(session), console.used_elsewhere
+    not_stopped = f"NOT STOPPED: {elsewhere}; a person must stop it, on any page of the robot."
+    return report.model_copy(update={"next": not_stopped}) if elsewhere else report
 
 
 READING: Sequence[Callable[..., object]] = (read_robot, check_program, follow_mission, write_program)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import threading
 import time
 from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import aclosing, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Self
 from urllib.parse import quote
@@ -36,6 +36,7 @@ from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.pool import SHARED_POOL
 from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.web.hold_file import HoldFile
 
 MAX_PROGRAM_CHARACTERS = 200_000
 """The maximum length of a program or an instruction."""
@@ -43,7 +44,6 @@ MAX_PROGRAM_CHARACTERS = 200_000
 MAX_WAIT_SECONDS = 15.0
 """The longest time that a request waits for a change."""
 
-HOLD_POLL_SECONDS = 0.1
 CLEANUP_SECONDS = 2.0
 """The time limit for ending a mission if its program has not begun to run."""
 
@@ -83,10 +83,9 @@ class Console:
         self.unfinished = ""  # the mission that had begun and ended early before another one was written
         self._checking = threading.Lock()
         which = quote(f"{robot.name} {normalize_address(robot.address)}", safe="", errors="replace")
-        self._hold_file = home / "robots" / f"{which[:200]}.held"  # changed when a person presses STOP
+        press = partial(self.stop, "STOP in another process")
+        self._hold = HoldFile(home / "robots" / f"{which[:200]}.held", press)
         self._stopped: MissionSession | None = None  # the session at the last hold in this process
-        self._holds = False  # whether there is a hold that may not be on the disk yet
-        self._writer = threading.Thread()  # writes it
         self._lost: MissionSession | None = None  # whose robot may still move
         self._stopping = threading.Thread()  # sends a stop to that robot
         self._began = 0.0  # the time at which the current session began
@@ -95,7 +94,7 @@ class Console:
     def __enter__(self) -> Self:
         self.interrupted = tuple(find_interrupted(self.home))
         make_folder(self.home / "missions")
-        make_folder(self._hold_file.parent)
+        self._hold.open()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -109,8 +108,7 @@ class Console:
             lost = self._forget_loss()
         if lost is not None:
             lost.stop_soon(BY_SHUTDOWN).join(STOP_GRACE_SECONDS)
-        if self._writer.is_alive():
-            self._writer.join(CLEANUP_SECONDS)
+        self._hold.close()
         is_checking = self._checking.locked() or (session is not None and bool(session.view.busy))
         if session is not None and session is not lost:
             session.stop(BY_SHUTDOWN)
@@ -130,13 +128,15 @@ class Console:
         await self.notifier.until(lambda: self.view.is_over == over, MAX_WAIT_SECONDS)
         return self.view
 
-    def begin(self, order: MissionOrder, *, by_agent: bool = False) -> MissionSession:
+    def begin(
+        self, order: MissionOrder, *, by_agent: bool = False, after: MissionSession | None = None
+    ) -> MissionSession:
         """Begin a mission, by default with the first model. Raise MissionError while another mission runs.
 
         With `by_agent`, the notice about interrupted missions stays, so that a person still sees it.
         """
         noticed = self.interrupted if by_agent else ()
-        session = self._begin(order)
+        session = self._begin(order, after=after)
         self.interrupted = noticed
         if self.recoveries:
             threading.Thread(target=self._recover, args=(session,), daemon=True).start()
@@ -180,26 +180,13 @@ class Console:
                 world=self.world,
                 within=self.within,
             )
-            if self._writer.is_alive():
-                self._writer.join(CLEANUP_SECONDS)
             self._began = time.time()
             session.start()
-            threading.Thread(target=self._obey_other_stops, args=(session, self._began), daemon=True).start()
         if before is not None and not before.view.is_over:
             before.stop_soon("another instruction")
         self.interrupted = ()
         self.notifier.change()
         return session
-
-    def _obey_other_stops(self, session: MissionSession, began: float) -> None:
-        """Stop an approved mission once a person presses STOP in another process that offers this robot."""
-        while not session.view.is_over:
-            with suppress(OSError):
-                is_new = self._hold_file.stat().st_mtime > began and session is not self._stopped
-                if is_new and session.view.is_approved:
-                    session.stop("STOP in another process")
-                    return
-            time.sleep(HOLD_POLL_SECONDS)
 
     def past_of(self, mission: str) -> MissionPast:
         """Read what a mission (an ID or `last`) did and saw. Raise UserError if it cannot be continued."""
@@ -259,17 +246,13 @@ class Console:
     @property
     def is_held(self) -> bool:
         """Whether a person must approve the next mission, since STOP was pressed or the robot was lost."""
-        return self._holds or self._hold_file.exists()
+        return self._hold.exists
 
     def _end_hold(self) -> None:
         """End the hold after a person's STOP if a person has approved the mission that began after it."""
         session = self.session
-        if session is None or not session.is_approved_by_person or session is self._stopped:
-            return
-        self._holds = False
-        with suppress(OSError):
-            if self._began > self._hold_file.stat().st_mtime:
-                self._hold_file.unlink()
+        if session is not None and session.is_approved_by_person and session is not self._stopped:
+            self._hold.remove(before=self._began)
 
     def dismiss(self) -> None:
         """Dismiss the notice about interrupted missions."""
@@ -290,13 +273,14 @@ class Console:
             other = "" if is_active or lost is not None else Reservation(self.robot, self.home).holder()
             self.used_elsewhere = other and f"another tool ({other}) uses the robot"
             is_approved = session is not None and session.view.is_approved
-            stops = not only_moving or lost is not None or bool(other) or is_approved
+            stops = not only_moving or bool(self.warning or other) or is_approved
             if session is not None and is_active and stops:
                 session.stop_soon(by)
             if lost is not None and not self._stopping.is_alive():
                 self._stopping = lost.stop_soon(by)
             if holds and stops:
-                self._hold(session)
+                self._stopped = session
+                self._hold.write()
         return stops and (is_active or lost is not None)
 
     def _forget_loss(self) -> MissionSession | None:
@@ -309,28 +293,19 @@ class Console:
     @property
     def warning(self) -> str:
         """Why a lost robot may still move, as a sentence; empty after a person has approved a new mission."""
-        lost = self._forget_loss()
-        return "" if lost is None else f"The robot may still move. {capitalize(shortened(lost.view.reason))}."
+        if (lost := self._forget_loss()) is None:
+            if self._hold.warning:
+                self._end_hold()
+            return self._hold.warning
+        return f"The robot may still move. {capitalize(shortened(lost.view.reason))}."
 
     def _change(self) -> None:
         """Wake all viewers. Once a robot is lost, have a person approve the next mission."""
         session = self.session
         if session is not None and session.may_move and session is not self._lost:
-            self._lost = session
-            self._hold(session)
+            self._lost = self._stopped = session
+            self._hold.write(self.warning)
         self.notifier.change()
-
-    def _hold(self, session: MissionSession | None) -> None:
-        """Have a person approve the mission after this session."""
-        self._stopped, self._holds = session, True
-
-        def write() -> None:
-            with suppress(OSError):
-                self._hold_file.touch()
-                os.utime(self._hold_file)
-
-        self._writer = threading.Thread(target=write, daemon=True)  # no STOP waits for the disk
-        self._writer.start()
 
     def check(
         self, program: str, room_map: RoomMap | None = None, rules: tuple[Rule, ...] = ()

@@ -718,6 +718,14 @@ def test_a_robot_that_is_lost_ends_the_steps(tmp_path: Path) -> None:
         use(gatekeeper, act)
 
 
+def test_an_agents_stop_says_if_another_process_uses_the_robot(gatekeeper: Gatekeeper) -> None:
+    async def act(agent: Agent) -> None:
+        assert "NOT STOPPED" in (await agent.call("stop"))["next"]
+
+    with Reservation(gatekeeper.console.robot, gatekeeper.console.home):
+        use(gatekeeper, act)
+
+
 def test_after_a_loss_the_agent_and_its_person_are_warned(tmp_path: Path) -> None:
     robot = FakeRobot(lambda skill, _: ANSWERS.get(skill))
     gatekeeper = Gatekeeper(Console(robot, tmp_path, open_recorded), asks_client=True)

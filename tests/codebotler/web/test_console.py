@@ -845,6 +845,37 @@ def test_stop_reaches_a_mission_of_another_process(tmp_path: Path, *, only_movin
         assert one.is_held
 
 
+def test_each_press_reaches_a_robot_that_another_process_has_lost(tmp_path: Path) -> None:
+    robot = FakeRobot(lose)
+    with make_console(tmp_path, robot) as one, make_console(tmp_path, FakeRobot(lose)) as other:
+        run_and_lose(one)
+        wait_until(one, lambda _: "the line is dead" in other.warning)
+        for _ in range(2):
+            cancels = robot.cancels
+            assert not other.stop("a person", only_moving=True, holds=True), "it has nothing to stop itself"
+            wait_until(one, lambda _, before=cancels: robot.cancels > before)  # type: ignore[misc]  # mypy does not infer such lambdas
+        assert one.session is not None
+        assert "line is dead" in one.session.view.reason
+    assert "the line is dead" in one.warning
+    again = make_console(tmp_path, FakeRobot(lose))
+    with again:
+        assert "the line is dead" in again.warning, "also after a restart"
+
+
+def test_a_press_in_another_process_ends_a_proposal_and_a_recovery(tmp_path: Path) -> None:
+    with make_console(tmp_path) as one, make_console(tmp_path) as other:
+        begin_and_check(one)
+        session = one.session
+        other.stop("a person", holds=True)
+        wait_until(one, lambda view: view.is_over)
+        with pytest.raises(MissionError):
+            one.begin(MissionOrder(program=HELLO), after=session)
+        begin_and_approve(one)
+        assert wait_until(one, lambda view: view.is_over).state is MissionState.DONE, "a person has approved"
+        begin_and_check(one)
+        assert not one.is_held
+
+
 def test_a_warning_is_short_and_visible(tmp_path: Path) -> None:
     def talk(skill: str, first: str) -> RobotResult:
         if skill == "say":
@@ -878,7 +909,7 @@ def test_end_stops_a_robot_that_was_lost(tmp_path: Path) -> None:
 def test_no_stop_waits_for_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     may_write, writers = threading.Event(), list[threading.Thread]()
 
-    def write_slowly(*_: object) -> None:
+    def write_slowly(*_: object, **__: object) -> None:
         writers.append(threading.current_thread())
         may_write.wait(30)
 

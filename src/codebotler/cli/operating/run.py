@@ -87,10 +87,10 @@ def run(console: Console, request: Request) -> int:
     Returns:
         the exit status: 0 if the mission is done, 128 plus the number of a signal that stopped it, or else 1.
     """
-    order, approval, begun = request.order_on(console), None, SessionView()
+    order, approval, begun, session = request.order_on(console), None, SessionView(), None
     with console:
         for left in range(request.recoveries, -1, -1):
-            session = console.begin(order)
+            session = console.begin(order, after=session)
             try:
                 status = _carry_out(session, console.robot, request, approval)
             except KeyboardInterrupt:

@@ -37,7 +37,7 @@ class InstructionPane:
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._number = -1
+        self._shown = -1, ""
         self._asked = ""
         self._ended = ""
         with ui.element("section").classes("pane instruct").props('aria-labelledby="h-instruct"'):
@@ -88,8 +88,8 @@ class InstructionPane:
 
     def show(self, view: SessionView) -> None:
         """Show the mission's instruction and its error, but keep an instruction that is being typed."""
-        if view.number != self._number:
-            self._number = view.number
+        if (view.number, view.instruction) != self._shown:
+            self._shown = view.number, view.instruction
             if (self._text.value or "").strip() in {"", self._asked}:  # keep text that is being typed
                 self._text.value = visible_lines(view.instruction)
             self._asked = visible_lines(view.instruction)
