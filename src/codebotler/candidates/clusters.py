@@ -263,7 +263,7 @@ def _run_with_settled_people(
         homes.setdefault(name, []).append(room)
     samplers = []
     for number in range(MAX_SHARED_WORLDS, MAX_SHARED_WORLDS + SETTLED_WORLDS):
-        sampler = FactSampler(settings.seed, number, by_options=True)
+        sampler = FactSampler(settings.seed, number, by_options=True, draws_people=True)
         forced: list[Draw] = []
         for name, rooms in homes.items():
             home = rooms[sampler.draw(len(rooms), "home", name)]

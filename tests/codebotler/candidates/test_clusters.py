@@ -12,6 +12,7 @@ from codebotler.candidates.clusters import (
     conflicts_in_worlds,
     shared_rooms,
 )
+from codebotler.candidates.question import question_about
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.rtl import parse
@@ -93,6 +94,17 @@ def test_further_worlds_try_facts_that_no_random_world_has(worker: Worker) -> No
     asks = f'def task_program():\n    say(ask("", "How many cups?", {options}))\n'
     (found,) = cluster(worker, asks).clusters
     assert len({one.said for one in found.behaviours}) == len(options)
+
+
+def test_who_is_asked_is_not_there_if_another_program_finds_nobody(worker: Worker) -> None:
+    visit = "def task_program():\n    for room in get_all_rooms():\n        go_to(room)\n        {}\n"
+    asks = visit.format("say(ask('zoe', 'Tea?', ['yes']))")
+    looks = visit.format("if is_in_room('zoe'): say(ask('zoe', 'Tea?', ['yes']))")
+    found = cluster(worker, asks, looks, rooms=RoomMap(("hall", "lab"), "hall"))
+    question = question_about(found)
+    assert question is not None
+    assert any("not" in fact or "nobody" in fact for fact in question.facts)
+    assert any("does not finish" in option.difference for option in question.options)
 
 
 def test_a_person_is_in_one_room_in_some_world(worker: Worker) -> None:

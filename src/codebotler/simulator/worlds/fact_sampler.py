@@ -21,6 +21,7 @@ class FactSampler:
         lucky: whether seven of eight choices are good: things and people are there, and people agree.
         forced: facts with given results, which are not chosen at random.
         by_options: whether an answer depends on the room and the options, and not on the question.
+        draws_people: whether the presence of a person is random even if the program takes it for granted.
     """
 
     seed: int = 0
@@ -29,6 +30,7 @@ class FactSampler:
     lucky: bool = False
     forced: tuple[Draw, ...] = ()
     by_options: bool = False
+    draws_people: bool = False
 
     def draw(self, count: int, *fact: str) -> int:
         """Return a random number from 0 to `count - 1` for a fact, always the same for the same texts."""

@@ -366,7 +366,8 @@ class SampledRobot(SimulatedRobot):
         if is_there is None and around.lacks(SOMEBODY):
             is_there = False
         if is_there is None:
-            is_there = self.settle(who, self._around, is_random=self.sampler.strict)
+            is_random = self.sampler.strict or self.sampler.draws_people
+            is_there = self.settle(who, self._around, is_random=is_random)
         if is_there:
             around.people |= {who, SOMEBODY}
         return is_there
@@ -386,7 +387,10 @@ class SampledRobot(SimulatedRobot):
 
     def _lies_there(self, name: str) -> bool:
         if name in self.here.gone:  # there may have been several of the same kind
-            self.has_assumed |= not self.sampler.strict
+            fact = SampledFact('another "{}" is in "{}"', (name, self.room), is_random=False)
+            if not self.sampler.strict and fact not in self.facts:
+                self.has_assumed = True
+                self.facts.append(fact)
             return not self.sampler.strict
         return self.settle(name, self.room, is_random=self.sampler.strict)
 
