@@ -12,7 +12,7 @@ from pathlib import Path
 from codebotler.core.files import make_folder
 
 HOLD_POLL_SECONDS = 0.1
-WRITE_SECONDS = 2.0
+HOLD_WRITE_SECONDS = 2.0
 
 
 class HoldFile:
@@ -50,7 +50,7 @@ class HoldFile:
     def finish(self) -> None:
         """Wait for a write to end, but not for long."""
         if self._writer.is_alive():
-            self._writer.join(WRITE_SECONDS)
+            self._writer.join(HOLD_WRITE_SECONDS)
 
     @property
     def exists(self) -> bool:
