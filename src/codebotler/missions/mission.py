@@ -33,7 +33,7 @@ from codebotler.missions.storage.map_event import map_data
 from codebotler.missions.storage.past import MissionPast
 from codebotler.missions.storage.pictures import PictureStore
 from codebotler.robots.base import RobotLostError
-from codebotler.robots.reservation import Reservation
+from codebotler.robots.reservation import Reservation, normalize_address
 from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.guard.rule_guard import RuleGuard
@@ -245,7 +245,8 @@ class Mission:
                 reserved.use()
                 self._live, self.stop_button.robot = live, reserved.robot
             will = reserved.robot.if_tool_dies
-            self._step(MissionState.RUNNING, "run", if_tool_dies=will, place=place)
+            address = normalize_address(reserved.robot.address)
+            self._step(MissionState.RUNNING, "run", if_tool_dies=will, place=place, address=address)
         if contracts:
             self._write("contract", contracts=[contract_data(contract) for contract in contracts])
         work = threading.Thread(target=self._execute, args=(live, drive), name=self.id, daemon=True)

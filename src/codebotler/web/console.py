@@ -190,7 +190,8 @@ class Console:
 
     def past_of(self, mission: str) -> MissionPast:
         """Read what a mission (an ID or `last`) did and saw. Raise UserError if it cannot be continued."""
-        return read_past(find_mission(self.home, mission), self.robot.skills, self.robot.name, self.world)
+        robot, folder = self.robot, find_mission(self.home, mission)
+        return read_past(folder, robot.skills, robot.name, self.world, robot.address)
 
     def rest_of(
         self, past: MissionPast, program: str = "", author: str = "", *, model: str = ""

@@ -55,6 +55,17 @@ def fail(home: Path, program: str) -> Path:
     return failed_mission(home, program, WORLD)
 
 
+def test_past_of_a_robot_is_not_that_of_another_one_of_its_kind(tmp_path: Path) -> None:
+    folder = fail(tmp_path, BRING)
+    summary = MissionSummary.read(folder)
+    summary.address = "ws://127.0.0.1:9090"
+    summary.write(folder)
+    for same in ("ws://LOCALHOST:9090/", ""):
+        assert read_past(folder, SKILLS, address=same).mission == summary.id
+    with pytest.raises(UserError):
+        read_past(folder, SKILLS, address="ws://127.0.0.1:9091")
+
+
 def test_past_lists_steps_with_their_places_and_answers(tmp_path: Path) -> None:
     past = read_past(fail(tmp_path, BRING), SKILLS)
     done = [(one.kind, one.text, one.place, one.answer) for one in past.trace]

@@ -100,6 +100,7 @@ class MissionSummary:
     if_tool_dies: str = ""  # what the robot does if CodeBotler ends unexpectedly
     place: str = ""  # where the robot was when the program began; empty if unknown
     continues: str = ""  # the ID of the mission whose rest this one does
+    address: str = ""  # where the robot was reached, if it has an address, as `normalize_address` writes it
 
     @property
     def has_ended(self) -> bool:

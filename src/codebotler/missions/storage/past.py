@@ -25,6 +25,7 @@ from codebotler.core.world import World
 from codebotler.missions.display.progress import Progress
 from codebotler.missions.storage.log import LogLine, MissionState, MissionSummary, find_skill_end, read_events
 from codebotler.missions.storage.store import find_mission, find_rest
+from codebotler.robots.reservation import normalize_address
 from codebotler.robots.simulated import SIMULATION
 from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.worlds.room_map import RoomMap
@@ -158,7 +159,7 @@ class MissionPast:
 
 
 def read_past(
-    folder: Path, skills: SkillTable, robot_kind: str = "", world: World | None = None
+    folder: Path, skills: SkillTable, robot_kind: str = "", world: World | None = None, address: str = ""
 ) -> MissionPast:
     """Read from a mission's log what the robot did and saw.
 
@@ -167,10 +168,10 @@ def read_past(
         skills: the robot's skills.
         robot_kind: the kind of robot that will do the rest; by default that of the mission.
         world: the map of that robot, or None if it has none.
+        address: the address of that robot, or "" to accept any robot of its kind.
 
     Raises:
-        UserError: the mission cannot be continued, ran on another kind of robot or another map, or its log is
-            invalid.
+        UserError: the mission cannot be continued, ran on another robot or map, or its log is invalid.
     """
     summary = MissionSummary.read(folder)
     if robot_kind not in {"", summary.robot}:
@@ -180,9 +181,12 @@ def read_past(
     before: LogLine = next((line for line in events if line["event"] == "past"), {})
     has_run = any(line["event"] == "state" and line["state"] == MissionState.RUNNING for line in events)
     if before and not has_run:  # the rest is still that of the mission before it
-        return read_past(find_mission(folder.parent.parent, summary.continues), skills, robot_kind, world)
+        earlier = find_mission(folder.parent.parent, summary.continues)
+        return read_past(earlier, skills, robot_kind, world, address)
     if not has_run:  # nobody approved its program
         raise UserError(f"mission {summary.id} never ran; give the instruction again")
+    if summary.address and address and normalize_address(address) != summary.address:
+        raise UserError(f"mission {summary.id} ran on the robot at {summary.address}; continue it there")
     try:
         if world is not None:
             _expect_same_map(summary.id, events, world)
