@@ -170,3 +170,29 @@ def test_message_about_a_missing_skill_ends_with_its_line(tmp_path: Path, open_p
         mission = run_to_end(server, FAILS)
         events = server.call("GET", f"/api/missions/{mission}/events.jsonl").text
     assert "before the robot moves: line 3: this robot has no `pick`" in events
+
+
+LOSES = """
+class Spot:
+    def rooms(self): return ["hall", "lab"]
+    def get_current_location(self): return "hall"
+    def stop(self): pass
+    def go_to(self, location): pass
+    def say(self, message): raise ConnectionError("no route")
+"""
+
+
+def test_a_lost_robot_is_not_said_to_have_stopped(tmp_path: Path, open_page: OpenPage) -> None:
+    (tmp_path / "loses.py").write_text(LOSES)
+    with PageServer(tmp_path, "--robot", "loses.py:Spot") as server:
+        page = open_page(server)
+        run_to_end(server, "def task_program():\n    say('a')\n")
+        expect(page.locator(".headline")).to_have_text("Failed")
+        server.call("POST", "/api/missions", {"program": "def task_program():\n    go_to('lab')\n"})
+        expect(page.locator(".status .lost")).to_contain_text("no route")
+        page.locator("#stop").click()
+        expect(page.locator(".headline")).to_have_text("Stopped")
+        expect(page.locator("#stop-told")).to_contain_text("may still move")
+        expect(page.locator(".status .lost")).to_contain_text("no route")
+        page.context.close()
+        server.rest()

@@ -50,7 +50,7 @@
       const { stopping, warning, detail } = await answer.json();
       if (!answer.ok) throw new Refused(detail);
       if (warning) {
-        say(UNSURE, "bad", true);
+        say(UNSURE, "bad");
       } else if (stopping) {
         say("Stop sent. Waiting for the robot to confirm …", "busy");
         await watch(which);
@@ -60,7 +60,8 @@
     } catch (error) {
       say(error instanceof Refused ? `${REFUSED} (${error.message})` : LOST, "bad");
     }
-    setTimeout(() => which === pressed && !output.classList.contains("bad") && say(""), SHOWN);
+    const lasts = () => output.classList.contains("bad") && output.textContent !== UNSURE; // the page warns, too
+    setTimeout(() => which === pressed && !lasts() && say(""), SHOWN);
     await clearOnceBegun(which);
   };
 
