@@ -75,9 +75,8 @@ def make_reply(
     no program, if the server does. `has_answer` is False for a refusal, tool calls or an error message.
     """
     answer = text if has_answer else ""
-    found = read_reply(
-        answer if opening is None else opening.program_from(answer), continues=opening is not None
-    )
+    code = answer if opening is None else opening.program_from(answer)
+    found = read_reply(code, continues=opening is not None)
     has_code = found.has_code and has_answer
     why = classify_reply(text, found.program, finish_reason, has_code=has_code, known_kind=known_kind)
     thoughts = "\n".join(filter(None, (reasoning, found.reasoning)))

@@ -31,10 +31,8 @@ def read_key(variable: str) -> str | None:
     if not key.strip():
         return None
     if not (key.isascii() and key.isprintable() and key == key.strip()):
-        raise UserError(
-            f"the key in {variable} has a line break, a space at an end, or a non-ASCII character; "
-            "set it again"
-        )
+        flaws = "a line break, a space at an end, or a non-ASCII character"
+        raise UserError(f"the key in {variable} has {flaws}; set it again")
     return key
 
 
@@ -100,9 +98,7 @@ def guard_logs() -> None:
     The warnings are not needed, because CodeBotler itself names the settings that a model does not support.
     """
     warnings.filterwarnings("ignore", module="|".join(CLIENT_LOGGERS))
-    known = logging.root.manager.loggerDict
-    for name in [
-        *CLIENT_LOGGERS,
-        *(name for name in known if name.startswith(tuple(f"{top}." for top in CLIENT_LOGGERS))),
-    ]:
+    prefixes = tuple(f"{name}." for name in CLIENT_LOGGERS)
+    children = [name for name in logging.root.manager.loggerDict if name.startswith(prefixes)]
+    for name in (*CLIENT_LOGGERS, *children):
         logging.getLogger(name).addFilter(_REDACTION)

@@ -242,9 +242,8 @@ class LocalModel:
         return tokens[: next((at for at, token in enumerate(tokens) if token in self.ends), len(tokens))]
 
     def _decode(self, tokens: list[int]) -> str:
-        return str(
-            self.tokenizer.decode(tokens, skip_special_tokens=True, clean_up_tokenization_spaces=False)
-        )
+        text = self.tokenizer.decode(tokens, skip_special_tokens=True, clean_up_tokenization_spaces=False)
+        return str(text)
 
     def _end(self, job: _Job, text: str) -> int:
         return len(text) if self.is_chat else task_end(job.prompt.opening, text, job.prompt.stop)

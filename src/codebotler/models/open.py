@@ -62,10 +62,8 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
 def expect_server(*names: str) -> None:
     """Raise UserError if none of the named models runs on a server, so that a base URL would be useless."""
     if not any(map(runs_on_server, names)):
-        raise UserError(
-            f"{' and '.join(names)} cannot use a base URL; leave it out, or choose a model such as "
-            "openai-chat:NAME"
-        )
+        fix = "leave it out, or choose a model such as openai-chat:NAME"
+        raise UserError(f"{' and '.join(names)} cannot use a base URL; {fix}")
 
 
 def runs_on_server(name: str) -> bool:

@@ -106,9 +106,8 @@ class RecordedModel:
         known = {_words(instruction): instruction for instruction in self.replies}
         instruction = known.get(_words(prompt.instruction))
         if instruction is None:
-            raise UnknownInstructionError(
-                self.name, prompt.instruction, find_closest(prompt.instruction, self.suggestions)
-            )
+            closest = find_closest(prompt.instruction, self.suggestions)
+            raise UnknownInstructionError(self.name, prompt.instruction, closest)
         program = self._program(instruction, number, prompt.last_step)
         on_text(program)
         return Reply(program, program, Usage(), 0.0, "stop")

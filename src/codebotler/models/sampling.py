@@ -53,9 +53,8 @@ class SamplingSettings:
 
     def __post_init__(self) -> None:
         if self.temperature is not None and not 0 <= self.temperature <= MAX_TEMPERATURE:
-            raise UserError(
-                f"the temperature is {self.temperature:g}; it must be from 0 to {MAX_TEMPERATURE}"
-            )
+            fix = f"it must be from 0 to {MAX_TEMPERATURE}"
+            raise UserError(f"the temperature is {self.temperature:g}; {fix}")
         if self.top_p is not None and not 0 < self.top_p <= 1:
             raise UserError(f"top-p is {self.top_p:g}; it must be above 0 and at most 1")
         if self.max_tokens is not None and self.max_tokens < 1:

@@ -47,9 +47,8 @@ def find_usable_models(servers: Mapping[str, int] = MODEL_SERVERS) -> list[Usabl
     local = [model for server, port in servers.items() for model in _list_models(server, port)]
     keys = [key for key in KEY_VARIABLES if os.environ.get(key, "").strip()]
     by_key = [UsableModel(KEY_VARIABLES[key], f"{key} is set") for key in keys]
-    recorded = [
-        UsableModel(f"recorded:{name}", "written by hand, for known instructions") for name in RECORDED_NAMES
-    ]
+    why = "written by hand, for known instructions"
+    recorded = [UsableModel(f"recorded:{name}", why) for name in RECORDED_NAMES]
     return [*local, *by_key, *recorded]
 
 
@@ -71,8 +70,5 @@ def _list_models(server: str, port: int) -> list[UsableModel]:
     finally:
         connection.close()
     url = f"http://127.0.0.1:{port}/v1"
-    return [
-        UsableModel(f"openai-chat:{name}", f"{server} answers on this machine", url)
-        for name in names
-        if "embed" not in name
-    ]
+    why = f"{server} answers on this machine"
+    return [UsableModel(f"openai-chat:{name}", why, url) for name in names if "embed" not in name]

@@ -40,9 +40,8 @@ class Sighting:
             return
         left, top, right, bottom = self.box
         if not (0 <= left < right <= 1 and 0 <= top < bottom <= 1):
-            raise ValueError(
-                f"the box {list(self.box)} is wrong; use left < right and top < bottom, each between 0 and 1"
-            )
+            fix = "use left < right and top < bottom, each between 0 and 1"
+            raise ValueError(f"the box {list(self.box)} is wrong; {fix}")
 
 
 class Detector(Protocol):

@@ -122,9 +122,8 @@ def _group_similar(
     leaders: list[tuple[Counter[str], list[Row]]] = []
     for lines, those in sorted(of_shape.items(), key=lambda item: (-len(item[1]), key_of(item[1][0]))):
         counts = Counter(lines)
-        near = next(
-            (group for leader, group in leaders if similarity(leader, counts) >= MIN_SIMILARITY), None
-        )
+        similar = (group for leader, group in leaders if similarity(leader, counts) >= MIN_SIMILARITY)
+        near = next(similar, None)
         if near is None:
             leaders.append((counts, those))
         else:

@@ -80,11 +80,9 @@ def expect_same_suite(opened: Sequence[Results], suite: str) -> None:
     if len({*digests}) > 1:
         now = opened[0].required_suite.digest
         stale = next(one for one, digest in zip(opened, digests, strict=True) if digest != now)
-        raise UserError(
-            "was judged by another version of the suite than other runs; "
-            f"`{evaluate_again(stale, suite)} --redo` judges with the current one",
-            file=stale.run.path,
-        )
+        why = "was judged by another version of the suite than other runs"
+        again = evaluate_again(stale, suite)
+        raise UserError(f"{why}; `{again} --redo` judges with the current one", file=stale.run.path)
 
 
 def open_run(
@@ -117,10 +115,8 @@ def open_run(
     if suite.house is not None and rules is not None:
         judged_by = results.manifest.get("house_rules") or {}
         if judged_by.get(suite.house.name) != suite.house.digest:
-            raise UserError(
-                f"has changed since the run was judged; `{again} --redo` judges with the new rules",
-                file=rules,
-            )
+            changed = f"has changed since the run was judged; `{again} --redo` judges with the new rules"
+            raise UserError(changed, file=rules)
     if results.manifest.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
     return results

@@ -65,9 +65,8 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawings:
 
 def _text(words: str) -> str:
     """Escape text for HTML. Unprintable characters, such as lone surrogates, are shown as escapes."""
-    plain = "".join(
-        c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in words
-    )
+    shown = (c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in words)
+    plain = "".join(shown)
     return escape(plain, quote=True)
 
 

@@ -154,9 +154,8 @@ def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list
     """Name each run after its label or model. Add the folder or a number to names that would be equal."""
     given = [labels.get(at) or run.model or run.folder for at, run in enumerate(runs)]
     plain = [short_name(name, MAX_RUN_NAME) for name in given]
-    names = _extend_duplicates(
-        plain, [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)]
-    )
+    with_folder = [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)]
+    names = _extend_duplicates(plain, with_folder)
     while len({*names}) < len(names):
         names = _extend_duplicates(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])
     return [replace(run, name=name) for run, name in zip(runs, names, strict=True)]
@@ -172,9 +171,8 @@ def price_runs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> list[J
     names = [(run.folder, run.name, run.model or "") for run in runs]
     for model in prices:
         if not any(model in those for those in names):
-            raise UserError(
-                f'--price names "{model}", but no run has this name, model or folder; '
-                f"use one of {', '.join(run.name for run in runs)}"
-            )
+            known = ", ".join(run.name for run in runs)
+            why = "no run has this name, model or folder"
+            raise UserError(f'--price names "{model}", but {why}; use one of {known}')
     found = (next((prices[name] for name in those if name in prices), None) for those in names)
     return [replace(run, price=price) for run, price in zip(runs, found, strict=True)]

@@ -42,9 +42,8 @@ def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
     one_model = len(models) == 1 and runs[0].model
     title = runs[0].name if len(runs) == 1 else one_model or f"{len(models)} models"
     each = [run.results.coverage for run in runs]
-    count = Coverage(
-        *(sum(counts) for counts in zip(*((c.judged, c.there, c.total) for c in each), strict=True))
-    )
+    counts = ((one.judged, one.there, one.total) for one in each)
+    count = Coverage(*map(sum, zip(*counts, strict=True)))
     by_hand = [run.name for run in runs if (run.model or "").startswith("recorded:")]
     suite = runs[0].suite
     lead = [f"{count}, judged with the suite \u201c{suite.name}\u201d: {suite.about}."]
@@ -106,9 +105,8 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         shown = None
         if isinstance(settings, dict):
             shown = ", ".join(f"{name} {json.dumps(value)}" for name, value in settings.items())
-        versions = dict.fromkeys(
-            str(batch["codebotler"]) for batch in batches(about) if "codebotler" in batch
-        )
+        recorded = (batch["codebotler"] for batch in batches(about) if "codebotler" in batch)
+        versions = dict.fromkeys(map(str, recorded))
         asked = (shown, about.get("template"), ", ".join(versions) or None)
         judged = (head.get(name) for name in ("codebotler", "python", "digest"))
         origin = ["not recorded" if value is None else str(value) for value in (*asked, *judged)]
@@ -164,9 +162,8 @@ def expect_no_others(out: Path) -> None:
     page_file = out / PAGE_FILE
     start = page_file.read_bytes()[:GENERATOR_WITHIN] if page_file.is_file() else b""
     if others and GENERATOR.encode() not in start:
-        raise UserError(
-            f'is not a report but contains other files such as "{others[0]}"; choose another folder', file=out
-        )
+        found = f'contains other files such as "{others[0]}"'
+        raise UserError(f"is not a report but {found}; choose another folder", file=out)
 
 
 def count_parts(sections: Sequence[Section]) -> int:

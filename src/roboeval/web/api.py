@@ -35,12 +35,8 @@ EvaluationQuery: TypeAlias = Annotated[
 
 def router(store: RunStore, all_runs: RunList) -> APIRouter:
     """Create the routes below `/api/runs`, which return runs and completions as JSON, and reports."""
-    api = APIRouter(
-        prefix="/api/runs",
-        tags=["runs"],
-        default_response_class=Response,
-        dependencies=[Depends(_raise_http_errors)],
-    )
+    errors = [Depends(_raise_http_errors)]
+    api = APIRouter(prefix="/api/runs", tags=["runs"], default_response_class=Response, dependencies=errors)
 
     @api.get("")
     def list_runs() -> Response:

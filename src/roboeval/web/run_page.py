@@ -171,10 +171,8 @@ def _draw_head(run: Snapshot, *, has_report: bool) -> None:
         if has_report:
             html.a("Report of this run", href=outside(f"/api/runs/{quote(run.name, safe='')}/report"))
         for other in run.evaluations if len(run.evaluations) > 1 else ():
-            link = html.a(
-                shortened(other, MAX_NAME),
-                href=outside(run_address(run.name) + CompletionFilter().query(other)),
-            )
+            address = run_address(run.name) + CompletionFilter().query(other)
+            link = html.a(shortened(other, MAX_NAME), href=outside(address))
             if other == key:
                 link.props('aria-current="true"')
 

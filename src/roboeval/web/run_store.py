@@ -134,9 +134,8 @@ class _Reader:
                 self._rests_until = ended + REST_FACTOR * (ended - began)
             version = self._version(self._stamps)
             if self._snapshot is None or self._snapshot.version != version:
-                self._snapshot = Snapshot(
-                    self._results, self.evaluations, self._run.is_being_written, version
-                )
+                is_written = self._run.is_being_written
+                self._snapshot = Snapshot(self._results, self.evaluations, is_written, version)
             return self._snapshot
 
     def version(self) -> Hashable:

@@ -104,10 +104,8 @@ def notes(run: Snapshot) -> list[str]:
         found.append(f"{warning}.")
     if run.judged and run.suite is None:
         name = shortened(str(results.manifest.get("suite")), MAX_SUITE_NAME)
-        found.append(
-            f'The suite "{name}" was not found, so failed checks are not explained; '
-            "use `roboeval serve --suite FOLDER`."
-        )
+        missing = f'The suite "{name}" was not found, so failed checks are not explained'
+        found.append(f"{missing}; use `roboeval serve --suite FOLDER`.")
     elif run.judged and run.suite is not None and results.manifest.get("digest") != run.suite.digest:
         found.append("The suite has changed since this run was judged; explanations may be missing.")
     return found

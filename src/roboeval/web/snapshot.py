@@ -108,21 +108,18 @@ class Snapshot:
         `passed` is null if the completion was not judged. `worlds` contains a sign for each world. `why` is
         the check or error that caused the failure.
         """
+        signs = pl.when(HAS_NO_PROGRAM.first()).then(pl.lit("")).otherwise(WORLD_SIGN.str.join(""))
         judged = self.results.table.group_by(KEY, maintain_order=True).agg(
             pl.col("passed", "^failure_.*$").first(),
-            pl.when(HAS_NO_PROGRAM.first())
-            .then(pl.lit(""))
-            .otherwise(WORLD_SIGN.str.join(""))
-            .alias("worlds"),
+            signs.alias("worlds"),
             FAILURE_CAUSE.filter(pl.col("world_number") == pl.col("failure_world")).first().alias("why"),
         )
         keys = [(storable(task), prompt, index) for task, prompt, index in self.results.completions]
         schema = {"task": pl.String, "prompt": pl.Int64, "index": pl.Int64}
         written = pl.DataFrame(keys, schema=schema, orient="row")
         tasks = () if self.suite is None else tuple(self.suite.tasks)
-        place = pl.col("task").replace_strict(
-            tasks, range(len(tasks)), default=len(tasks), return_dtype=pl.Int64
-        )
+        count = len(tasks)
+        place = pl.col("task").replace_strict(tasks, range(count), default=count, return_dtype=pl.Int64)
         every = written.join(judged, on=KEY, how="left")
         return every.with_columns(pl.col("worlds", "why").fill_null("")).sort(place, *KEY)
 

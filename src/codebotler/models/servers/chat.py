@@ -226,9 +226,8 @@ def supported_settings(model: Model, name: str, settings: SamplingSettings) -> S
     if settings.reasoning_effort is not None and not model.profile.get("supports_thinking"):
         raise UserError(f"{name} does not support a reasoning effort; remove it")
     if settings.reasoning_effort not in {None, *EFFORTS}:
-        raise UserError(
-            f'unknown reasoning effort "{settings.reasoning_effort}"; {name} supports {", ".join(EFFORTS)}'
-        )
+        known = ", ".join(EFFORTS)
+        raise UserError(f'unknown reasoning effort "{settings.reasoning_effort}"; {name} supports {known}')
     return _supported_by_anthropic(model.profile, settings) if model.system == "anthropic" else settings
 
 
@@ -258,9 +257,8 @@ def _is_reasoning(profile: Mapping[str, Any], effort: str | None) -> bool:
     if not profile.get("openai_supports_reasoning"):
         return False
     efforts = profile.get("openai_reasoning_efforts")
-    can_be_off = (
-        profile.get("openai_supports_reasoning_effort_none") if efforts is None else "none" in efforts
-    )
+    supports_none = profile.get("openai_supports_reasoning_effort_none")
+    can_be_off = supports_none if efforts is None else "none" in efforts
     if effort is None:
         return not can_be_off or bool(profile.get("thinking_enabled_by_default"))
     return not (can_be_off and effort == "none")
@@ -306,9 +304,8 @@ def _open_model(name: str, settings: SamplingSettings, http_client: object) -> M
             if isinstance(model, OpenAIChatModel) and provider in {"openai", OWN_SERVER, "ollama"}:
                 # Local servers support `max_tokens`, but many ignore OpenAI's newer name for it.
                 host = urlsplit(model.base_url).hostname or ""
-                is_new = host.endswith(NEW_LIMIT_HOSTS) or bool(
-                    model.profile.get("openai_supports_reasoning")
-                )
+                can_reason = bool(model.profile.get("openai_supports_reasoning"))
+                is_new = host.endswith(NEW_LIMIT_HOSTS) or can_reason
                 model.profile["openai_chat_supports_max_completion_tokens"] = is_new
             return model
     except UserError:
@@ -346,9 +343,8 @@ def _open_provider(name: str, base_url: str | None, http_client: object) -> Prov
         return infer_provider(name)
     make: Callable[..., Provider[object]] = infer_provider_class(name)
     if name.startswith("gateway/") or "base_url" not in inspect.signature(make).parameters:
-        raise UserError(
-            f'the provider "{name}" does not support a base URL; for your own server, use {OWN_SERVER}:MODEL'
-        )
+        fix = f"for your own server, use {OWN_SERVER}:MODEL"
+        raise UserError(f'the provider "{name}" does not support a base URL; {fix}')
     client = {} if http_client is None else {"http_client": http_client}
     return make(base_url=base_url, **client)
 

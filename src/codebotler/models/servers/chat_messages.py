@@ -45,9 +45,8 @@ def _request_part(message: PromptMessage) -> messages.ModelRequestPart:
 
 def definition_of(tool: Tool) -> ToolDefinition:
     """Convert a tool to pydantic-ai's `ToolDefinition`."""
-    return ToolDefinition(
-        name=tool.name, description=tool.description, parameters_json_schema=json.loads(tool.schema)
-    )
+    schema = json.loads(tool.schema)
+    return ToolDefinition(name=tool.name, description=tool.description, parameters_json_schema=schema)
 
 
 def turn_of(reply: Reply, response: messages.ModelResponse) -> Reply:

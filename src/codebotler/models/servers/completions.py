@@ -126,13 +126,10 @@ class CompletionsModel:
         if isinstance(error, openai.APITimeoutError):
             return timeout_error(self.name, self.settings.timeout)
         if isinstance(error, openai.APIStatusError):
-            return status_error(
-                self.name,
-                error.status_code,
-                error.body or error.response.text,
-                retry_after=ModelHTTPError(0, self.name, headers=error.response.headers).retry_after,
-                is_permanent=error.code == QUOTA_ERROR,
-            )
+            status, body = error.status_code, error.body or error.response.text
+            wait = ModelHTTPError(0, self.name, headers=error.response.headers).retry_after
+            is_quota = error.code == QUOTA_ERROR
+            return status_error(self.name, status, body, retry_after=wait, is_permanent=is_quota)
         if isinstance(error, openai.APIError) and error.body is not None:
             return error_in_reply(self.name, error.body)
         no_connection = connection_error(self.name, error, self.settings.base_url)

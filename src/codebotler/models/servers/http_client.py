@@ -45,9 +45,8 @@ def limit_replies(client: HTTPClient, name: str, limit: int) -> HTTPClient:
         response.stream = _limit_stream(response.stream, name, limit)
         if response.has_redirect_location:
             # Leave out parts that may be secret.
-            address = response.url.join(response.headers["location"]).copy_with(
-                userinfo=b"", query=None, fragment=None
-            )
+            target = response.url.join(response.headers["location"])
+            address = target.copy_with(userinfo=b"", query=None, fragment=None)
             sentence = f"{name}: the server redirects to {address}; change the base URL accordingly"
             raise ModelError(sentence, is_temporary=False)
         is_json = response.headers.get("content-type", "").startswith("application/json")
@@ -67,9 +66,8 @@ def _error_instead_of_stream(name: str, body: bytes) -> ModelError:
         reply = None
     if isinstance(reply, dict) and reply.get("choices") is None:
         return error_in_reply(name, reply.get("error") or reply)
-    return model_error(
-        name, "the server sent its reply in one piece, but only streams are supported", is_temporary=False
-    )
+    sentence = "the server sent its reply in one piece, but only streams are supported"
+    return model_error(name, sentence, is_temporary=False)
 
 
 def _limit_stream(stream: Any, name: str, limit: int) -> Any:  # noqa: ANN401 - see HTTPClient
@@ -82,9 +80,8 @@ def _limit_stream(stream: Any, name: str, limit: int) -> Any:  # noqa: ANN401 - 
             async for piece in stream:
                 remaining -= len(piece)
                 if remaining < 0:
-                    raise ModelError(
-                        f"{name}: the server sent more than {limit:,} bytes for one reply", is_temporary=False
-                    )
+                    sentence = f"{name}: the server sent more than {limit:,} bytes for one reply"
+                    raise ModelError(sentence, is_temporary=False)
                 yield piece
 
         async def aclose(self) -> None:

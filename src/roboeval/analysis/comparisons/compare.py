@@ -104,17 +104,14 @@ def per_mission(table: pl.DataFrame) -> pl.DataFrame:
     kept = pl.col("failure_class").is_in([NO_PROGRAM_CLASS, AGENT_ERROR_CLASS])
     is_check = pl.col("failed_checks").is_not_null()
     is_robots = pl.col("status") == Status.ROBOT_ERROR.value
-    of_world = (
-        pl.when(is_check).then(pl.lit(TASK_ERROR_CLASS)).when(is_robots).then(pl.lit(ROBOT_ERROR_CLASS))
-    )
+    of_check = pl.when(is_check).then(pl.lit(TASK_ERROR_CLASS))
+    of_world = of_check.when(is_robots).then(pl.lit(ROBOT_ERROR_CLASS)).otherwise(pl.lit(PYTHON_ERROR_CLASS))
     kind = pl.when(is_check).then("category").otherwise("error_kind")
     failed = pl.when(~pl.col("satisfied"))
     return table.with_columns(
         passed=pl.col("satisfied"),
         world_number=pl.lit(0),
-        failure_class=failed.then(
-            pl.when(kept).then("failure_class").otherwise(of_world.otherwise(pl.lit(PYTHON_ERROR_CLASS)))
-        ),
+        failure_class=failed.then(pl.when(kept).then("failure_class").otherwise(of_world)),
         failure_kind=failed.then(pl.when(kept).then("failure_kind").otherwise(kind)),
     )
 
@@ -176,12 +173,9 @@ def _better_sentence(comparison: Comparison, names: tuple[str, str]) -> str:
     if comparison.p_tasks <= SIGNIFICANCE:
         return f"{better} is better than {other} by {by} ({p_text(comparison.p_tasks)} over tasks)."
     if comparison.p_prompts <= SIGNIFICANCE:
-        tasks = counted(len(comparison.tasks), "task")
         p = f"{p_text(comparison.p_prompts)} over prompts"
-        return (
-            f"{better} is better than {other} by {by} on prompts like these ({p}); "
-            f"{tasks} are too few to generalise to others."
-        )
+        few = f"{counted(len(comparison.tasks), 'task')} are too few to generalise to others"
+        return f"{better} is better than {other} by {by} on prompts like these ({p}); {few}."
     p = f"{p_text(comparison.p_tasks)} over tasks"
     return f"{better} passes more often than {other} by {by}, but the difference is not significant ({p})."
 
@@ -252,10 +246,8 @@ def sample_size_sentences(comparison: Comparison) -> list[str]:
     if sizes.completions is None:
         return ["There is no difference, so no sample size can be computed."]
     each = how_many(sizes.completions)
-    total = sizes.completions * comparison.prompts
-    needed = [
-        f"For 80% power on these prompts, use {each} per prompt and model ({total:,} in all for each model)."
-    ]
+    total = f"{sizes.completions * comparison.prompts:,} in all for each model"
+    needed = [f"For 80% power on these prompts, use {each} per prompt and model ({total})."]
     if sizes.prompts is not None:
         needed.append(f"For 80% power on prompts like these, use {sizes.prompts:,} prompts.")
     return needed

@@ -156,10 +156,7 @@ def warn_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
 
 def changes_data(found: Sequence[VerdictChanges]) -> dict[str, Any]:
     """Convert the changes of all runs to JSON data, for `roboeval compare --suites --json`."""
-    return {
-        "suites": list(found[0].suites),
-        "runs": [_run_data(one, found) for one in found],
-    }
+    return {"suites": list(found[0].suites), "runs": [_run_data(one, found) for one in found]}
 
 
 def _run_data(one: VerdictChanges, all_of_them: Sequence[VerdictChanges]) -> dict[str, Any]:

@@ -198,9 +198,8 @@ def import_batch(path: Path, out: Path, suite: str) -> None:
         run, read = RunFolder(out), load_suite_option(suite)
         found = import_answers(run, read, path, progress=lambda done: update(done, ""))
     there, again = found.total - found.missing, command("evaluate", out, suite=suite)
-    note(
-        f"{there:,} of {how_many(found.total)} are in {out}, {found.new:,} of them new; `{again}` judges them"
-    )
+    total = how_many(found.total)
+    note(f"{there:,} of {total} are in {out}, {found.new:,} of them new; `{again}` judges them")
     if found.missing:
         lacks = f"{how_many(found.missing)} missing: {found.why}"
         note(f"roboeval: {lacks}; `roboeval generate --requests` requests them again")

@@ -252,13 +252,9 @@ def run(
         return path
 
     path = judge(complete_run(first, plan, model, what.pace))
+    most = repair or retries
     rounds = further_rounds(
-        what,
-        first,
-        repair or retries,
-        repairs=bool(repair),
-        workers=workers,
-        require_isolation=require_isolation,
+        what, first, most, repairs=bool(repair), workers=workers, require_isolation=require_isolation
     )
     paths = [path, *map(judge, rounds)]
     if with_report:
@@ -293,15 +289,8 @@ def further_rounds(
             return
         rejected = counted(len(problems), "completion")
         note(f"round {number}: the check rejects {rejected} of {len(planned):,}")
-        following = RoundPlan(
-            plan.suite,
-            plan.tasks,
-            plan.num_completions,
-            number=number,
-            repairs=repairs,
-            earlier=completions,
-            problems=problems,
-        )
+        same = plan.suite, plan.tasks, plan.num_completions
+        following = RoundPlan(*same, number=number, repairs=repairs, earlier=completions, problems=problems)
         latest = following.folder(run)
         yield complete_run(latest, following, what.open(), what.pace)
 

@@ -90,9 +90,8 @@ def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
     from roboeval.evaluation.recovery import recovery_data
 
     shares = "passed", "rejected", "failed"
-    table = ruled(
-        "task", "faults", "handled", "missing", "continued", *shares, "steps", "no fault", "repeated"
-    )
+    counts = "faults", "handled", "missing", "continued"
+    table = ruled("task", *counts, *shares, "steps", "no fault", "repeated")
     for task in [*dict.fromkeys(one.task for one in results), "all"]:
         data = recovery_data([one for one in results if task in {one.task, "all"}])
         cells = (

@@ -49,13 +49,9 @@ def comparison_view(
         rows.add_row(f"95% interval {name}", estimate.ends("+.3f"), remark)
     table = ruled("task", a, b, "difference", "adds", "prompts")
     for task in comparison.tasks:
-        cells = (
-            f"{task.first:.3f}",
-            f"{task.second:.3f}",
-            f"{task.second - task.first:+.3f}",
-            f"{round(task.share, 9):+.3f}",
-        )
-        table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
+        scores = f"{task.first:.3f}", f"{task.second:.3f}", f"{task.second - task.first:+.3f}"
+        adds = f"{round(task.share, 9):+.3f}"
+        table.add_row(Text(visible(task.task)), *scores, adds, str(task.prompts))
     sentence = Text(comparison_sentence(comparison, (a, b)), "bold")
     warnings = [
         Text(f"{name}: {warning}", "yellow")

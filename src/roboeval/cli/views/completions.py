@@ -111,11 +111,8 @@ def _reply(reply: Mapping[str, Any] | None, *, with_texts: bool) -> list[Rendera
     there = {name: text for name, text in texts.items() if text}
     if with_texts:
         for name, text in there.items():
-            parts += [
-                Text(),
-                Text(f"{name}:", "bold"),
-                Text(shortened(text, SHOWN_REPLY_CHARACTERS, visible_lines)),
-            ]
+            shown = shortened(text, SHOWN_REPLY_CHARACTERS, visible_lines)
+            parts += [Text(), Text(f"{name}:", "bold"), Text(shown)]
     elif there:
         long = " and ".join(f"{name} ({len(text):,} characters)" for name, text in there.items())
         parts.append(Text(f"{long}: {SHOW_REPLY}", "dim"))
@@ -144,11 +141,9 @@ def _world(world: Mapping[str, Any]) -> list[RenderableType]:
     if cut is not None:
         parts.append(Padding(Text(cut_sentence(cut), "yellow"), (0, 0, 0, 2)))
     for check in world["failed_checks"]:
-        text = Text.assemble(
-            ("failed ", "red"),
-            visible(plain_check(check["check"])),
-            f": {shortened(check['explanation'], MAX_EXPLANATION)}",
-        )
+        label = visible(plain_check(check["check"]))
+        why = shortened(check["explanation"], MAX_EXPLANATION)
+        text = Text.assemble(("failed ", "red"), f"{label}: {why}")
         parts.append(Padding(text, (0, 0, 0, 2)))
     return parts
 

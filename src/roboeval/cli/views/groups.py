@@ -91,6 +91,7 @@ def resample_view(
     for limit in (resample(prompts, retries) for retries in limits):
         shares = (*limit.prompts.values(), limit.accepted, limit.ran)
         table.add_row(f"{limit.retries}", f"{limit.passed.mean:.3f}", *(f"{share:.1%}" for share in shares))
+    ran = "run at all: the share of programs that run without an error in all worlds of their task"
     return Group(
         Text(visible(title), style="bold"),
         Text("results if each program that the check rejects is regenerated:"),
@@ -100,8 +101,5 @@ def resample_view(
         Text(f"over {coverage}", "" if coverage.is_whole else "yellow"),
         Text("pass@1 ≥ x: the share of prompts with a pass@1 of at least x", style="dim"),
         Text("accepted: the share of final programs that the check accepts", style="dim"),
-        Text(
-            "run at all: the share of programs that run without an error in all worlds of their task",
-            style="dim",
-        ),
+        Text(ran, style="dim"),
     )

@@ -61,9 +61,8 @@ def render(figure: Figure) -> dict[str, bytes]:
         figure.set_layout_engine(None)
     files = {kind: io.BytesIO() for kind in ("png", "pdf", "svg")}
     figure.savefig(files["png"], format="png", metadata={"Software": None}, pil_kwargs={"compress_level": 3})
-    figure.savefig(
-        files["pdf"], format="pdf", metadata=dict.fromkeys(("Creator", "Producer", "CreationDate"))
-    )
+    no_metadata = dict.fromkeys(("Creator", "Producer", "CreationDate"))
+    figure.savefig(files["pdf"], format="pdf", metadata=no_metadata)
     figure.savefig(files["svg"], format="svg", metadata=dict.fromkeys(("Creator", "Date")))
     return {kind: file.getvalue() for kind, file in files.items()}
 

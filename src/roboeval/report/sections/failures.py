@@ -110,9 +110,8 @@ def _cells(one: FailureGroup) -> list[Cell]:
 
 def other_suite_section(runs: Sequence[JudgedRun]) -> Section:
     """Build the section that compares verdicts under the report's suite with those under another suite."""
-    found = [
-        verdict_changes(run.name, run.results, run.other_suite) for run in runs if run.other_suite is not None
-    ]
+    judged = [(run, run.other_suite) for run in runs if run.other_suite is not None]
+    found = [verdict_changes(run.name, run.results, other) for run, other in judged]
     here, there = ranks(found)
     scores: list[list[Cell]] = []
     tasks: list[list[Cell]] = []

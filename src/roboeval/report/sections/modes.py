@@ -24,19 +24,11 @@ def mode_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         tokens = _mean(completions["input_tokens"] + completions["output_tokens"])
         passed = int(missions["satisfied"].sum()) / missions.height
         ended = missions["error_kind"].is_in([VIOLATION, OUTSIDE_CONTRACT]).fill_null(value=False)
-        rows.append(
-            [
-                run.name,
-                str(completions["mode"].drop_nulls().first() or "program"),
-                missions.height,
-                *(success.mean, success.low, success.high),
-                _mean(ended) or 0.0,
-                _mean(completions["turns"]),
-                _mean(completions["tool_errors"]),
-                tokens,
-                tokens / passed if tokens and passed else None,
-            ]
-        )
+        mode = str(completions["mode"].drop_nulls().first() or "program")
+        estimate = success.mean, success.low, success.high
+        means = _mean(ended) or 0.0, _mean(completions["turns"]), _mean(completions["tool_errors"])
+        per_pass = tokens / passed if tokens and passed else None
+        rows.append([run.name, mode, missions.height, *estimate, *means, tokens, per_pass])
     return sheet("modes", rows)
 
 
@@ -48,13 +40,8 @@ def _mean(values: pl.Series) -> float | None:
 def ending_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """Build the table of how agents' missions ended, how many of them passed, and after how many replies."""
     turns = pl.col("turns")
-    columns = (
-        pl.len(),
-        pl.col("passed").mean(),
-        turns.min(),
-        turns.median().alias("median"),
-        turns.max().alias("max"),
-    )
+    replies = turns.min(), turns.median().alias("median"), turns.max().alias("max")
+    columns = pl.len(), pl.col("passed").mean(), *replies
     rows = [
         [run.name, *ended]
         for run in runs
