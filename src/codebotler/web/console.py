@@ -9,9 +9,10 @@ from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import aclosing, suppress
 from dataclasses import replace
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
+from socket import gethostname
 from typing import Self
-from urllib.parse import quote
 
 from codebotler.checking.check import check
 from codebotler.checking.problems import CheckResult
@@ -82,9 +83,11 @@ class Console:
         self._may_recover: MissionSession | None = None  # the current session, unless somebody pressed STOP
         self.unfinished = ""  # the mission that had begun and ended early before another one was written
         self._checking = threading.Lock()
-        which = quote(f"{robot.name} {normalize_address(robot.address)}", safe="", errors="replace")
+        # A hold reaches as far as the lock of the robot: this machine, or without an address this folder.
+        where = f"{normalize_address(robot.address)} {gethostname()}" if robot.address else ""
+        digest = sha256(where.encode(errors="surrogatepass")).hexdigest()
         press = partial(self.stop, "STOP in another process")
-        self._hold = HoldFile(home / "robots" / f"{which[:200]}.held", press)
+        self._hold = HoldFile(home / "robots" / f"{robot.name} {digest}.held", press)
         self._stopped: MissionSession | None = None  # the session at the last hold in this process
         self._lost: MissionSession | None = None  # whose robot may still move
         self._stopping = threading.Thread()  # sends a stop to that robot

@@ -65,10 +65,13 @@ class HoldFile:
 
     def _write(self, warning: str) -> None:
         with self._lock, suppress(OSError):
-            if warning or not self._path.exists():
-                self._path.write_text(warning, encoding="utf-8", errors="backslashreplace")
-            now = time.time_ns()
-            os.utime(self._path, ns=(now, now))  # the kernel's own time is coarse
+            self._look()
+            make_folder(self._path.parent)
+            new, now = self._path.with_suffix(".new"), time.time_ns()
+            new.write_text(warning or self.warning, encoding="utf-8", errors="backslashreplace")
+            os.utime(new, ns=(now, now))  # the kernel's own time is coarse
+            new.replace(self._path)
+            self._is_pending = False
             self._look()
 
     def remove(self, *, before: float) -> None:

@@ -862,6 +862,15 @@ def test_each_press_reaches_a_robot_that_another_process_has_lost(tmp_path: Path
         assert "the line is dead" in again.warning, "also after a restart"
 
 
+def test_robots_with_long_addresses_have_holds_of_their_own(tmp_path: Path) -> None:
+    one, other = FakeRobot(), FakeRobot()
+    one.address, other.address = (f"/{'long' * 80}/{arm}/robot.py:Rob" for arm in ("left", "right"))
+    with make_console(tmp_path, one) as first, make_console(tmp_path, other) as second:
+        first.stop("a person", holds=True)
+        wait_until(first, lambda _: not first._hold._writer.is_alive())
+        assert (first.is_held, second.is_held) == (True, False)
+
+
 def test_a_press_in_another_process_ends_a_proposal_and_a_recovery(tmp_path: Path) -> None:
     with make_console(tmp_path) as one, make_console(tmp_path) as other:
         begin_and_check(one)

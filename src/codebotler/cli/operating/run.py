@@ -89,8 +89,15 @@ def run(console: Console, request: Request) -> int:
     """
     order, approval, begun, session = request.order_on(console), None, SessionView(), None
     with console:
+        if console.warning:
+            note(console.warning)
         for left in range(request.recoveries, -1, -1):
-            session = console.begin(order, after=session)
+            try:
+                session = console.begin(order, after=session)
+            except MissionError as error:  # a person has pressed STOP since
+                note(error.sentence)
+                print_rich(continue_view(begun))
+                return 1
             try:
                 status = _carry_out(session, console.robot, request, approval)
             except KeyboardInterrupt:

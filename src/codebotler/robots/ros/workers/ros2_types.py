@@ -72,8 +72,8 @@ def message_types(
             continue
         if not all(definitions.values()):
             if package not in sources:
-                mend = "source its workspace, or list its folder in packages"
-                raise SetupError(f"the ROS 2 package {package} is not installed; {mend}")
+                lacks = "is not installed; source its workspace, or list its folder in packages"
+                raise SetupError(f"the ROS 2 package {package} {lacks}")
             definitions.update(_definitions(sources[package], [*definitions]))
         sys.path.insert(0, str(build_package(package, definitions, tell)))
         importlib.invalidate_caches()
