@@ -277,7 +277,8 @@ class Console:
             other = "" if is_active or lost is not None else Reservation(self.robot, self.home).holder()
             self.used_elsewhere = other and f"another tool ({other}) uses the robot"
             is_approved = session is not None and session.view.is_approved
-            stops = not only_moving or bool(self.warning or other) or is_approved
+            may_move = lost is not None or bool(self._hold.warning or other)
+            stops = not only_moving or may_move or is_approved
             if session is not None and is_active and stops:
                 session.stop_soon(by)
             if lost is not None and not self._stopping.is_alive():
