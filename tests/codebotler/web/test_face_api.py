@@ -162,7 +162,8 @@ def test_the_face_shows_that_a_robot_does_not_confirm_its_stop(tmp_path: Path) -
     assert face_data(console, face)["reason"] == UNCONFIRMED_STOP
     console.session = type("Next", (), {"view": SessionView(2, "n"), "is_approved_by_person": False})()
     assert face_data(console, face)["reason"] == UNCONFIRMED_STOP, "the next mission only waits"
-    console.session.is_approved_by_person = True
+    console.session.is_approved_by_person, console._began = True, time.time() + 60
+    console._hold.finish()
     assert face_data(console, face)["reason"] == ""
 
 
