@@ -87,7 +87,7 @@ def test_score_below_the_threshold_is_not_found(folder: Path, detector: Detector
 
 def test_label_of_too_many_words_is_refused(detector: Detector) -> None:
     detector.look(PICTURE, "x" * (TOKENS - 2))
-    with pytest.raises(UserError, match=rf"{TOKENS + 1} tokens; .* {TOKENS} .*hf:"):
+    with pytest.raises(UserError, match=rf"{TOKENS + 1} tokens, but hf:.* {TOKENS}$"):
         detector.look(PICTURE, "x" * (TOKENS - 1))
     with pytest.raises(UserError, match="printable characters"):
         detector.look(PICTURE, " ")
@@ -98,7 +98,7 @@ def test_error_of_the_model_becomes_one_sentence(folder: Path, monkeypatch: pyte
     monkeypatch.setattr(detector._pipeline.model, "forward", lambda **_: 1 / 0)
     with pytest.raises(PerceptionError, match="division by zero") as error:
         detector.look(PICTURE, "mug")
-    assert error.value.sentence.startswith(f"hf:{folder}: ")
+    assert error.value.sentence.startswith(f"hf:{folder} failed: ")
     detector.close()
 
 

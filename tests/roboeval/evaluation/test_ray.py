@@ -66,7 +66,7 @@ NUMBERS: RunPrograms[int] = lambda _, works: [int(number) for _, number in works
 
 def test_another_version_is_refused() -> None:
     functions = (lambda _, works: works, list)
-    with pytest.raises(EngineError, match=r"has codebotler .*, not codebotler 0\.0\.1"):
+    with pytest.raises(EngineError, match=r"has codebotler .*; install codebotler 0\.0\.1"):
         run_shard(functions, [], "codebotler 0.0.1 with Python 3.9", {})
 
 
