@@ -117,6 +117,15 @@ class ClarifyingQuestion:
             return None
         return self.options[0 if answer == "decide" else answer]
 
+    def record(self, answer: ClarifyingAnswer) -> list[str]:
+        """Return sentences for a log: which option was chosen, and which ones were not."""
+        if (option := self.chosen(answer)) is None:
+            return self.rejections
+        who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
+        others = (one for one in self.options if one is not option)
+        rest = [f"another option was a robot that {one.difference}" for one in others]
+        return [f"{who}{self.supposition}: a robot that {option.difference}", *rest]
+
     def parse(self, line: str) -> ClarifyingAnswer:
         """Read a person's answer: the number of an option from 1, `none`, or `you decide`.
 

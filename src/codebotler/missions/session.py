@@ -76,11 +76,8 @@ class MissionSession(SharedView):
         self._checked: Contract | None = None  # of the last checked program
         self._editing = threading.Lock()  # held while the program is replaced or approved
         self._rejected: ClarifyingQuestion | None = None  # whose options a person did not mean
-        self._next_task: Callable[[Mission], None] | None = (  # the next task for the session's own thread
-            partial(self._take, program=order.program)
-            if order.has_program
-            else partial(self._ask, repair=False)
-        )
+        take, ask = partial(self._take, program=order.program), partial(self._ask, repair=False)
+        self._next_task: Callable[[Mission], None] | None = take if order.has_program else ask
         self._stop_button.on_press(self._end_waiting)
         self._thread = threading.Thread(target=self._run, name=f"session-{number}", daemon=True)
         self.error: Exception | None = None  # set if an error ended the session
@@ -353,8 +350,7 @@ class MissionSession(SharedView):
             if self._is_wanted():
                 raise
             return
-        is_second = self._rejected is not None
-        question = question_about(groups, model=self._view.model, is_second=is_second)
+        question = question_about(groups, model=self._view.model, is_second=self._rejected is not None)
         if question is not None and self._order.asks:
             with self._lock:
                 if self._next_task is None:  # else a person has written a program meanwhile
@@ -366,17 +362,12 @@ class MissionSession(SharedView):
     def _take_answer(
         self, mission: Mission, *, question: ClarifyingQuestion, answer: ClarifyingAnswer, more: str
     ) -> None:
+        for sentence in question.record(answer):
+            mission.note(sentence)
         option = question.chosen(answer)
         if option is not None:
-            who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
-            mission.note(f"{who}{question.supposition}: a robot that {option.difference}")
-            for one in (one for one in question.options if one is not option):
-                mission.note(f"another option was a robot that {one.difference}")
             self._take(mission, option.program)
-            return
-        for sentence in question.rejections:
-            mission.note(sentence)
-        if not more or question.why_last:
+        elif not more or question.why_last:
             mission.fail(f"no program does what was meant{question.why_last and '; '}{question.why_last}")
         else:
             self._rejected = question

@@ -268,7 +268,7 @@ def test_check_says_that_there_must_be_several_things() -> None:
     bring = "go_to('hall')\n    pick('mug')\n    go_to('lab')\n    place('mug')\n"
     once, twice = (f"def task_program():\n    {bring}{more}" for more in ("", f"    {bring}"))
     assert "another" not in check(once, rooms=["hall", "lab"]).assumption
-    assert 'another "mug" is in "hall"' in check(twice, rooms=["hall", "lab"]).assumption
+    assert '"another mug" is in "hall"' in check(twice, rooms=["hall", "lab"]).assumption
 
 
 def test_search_may_assume_that_the_thing_exists(checks: Checks) -> None:

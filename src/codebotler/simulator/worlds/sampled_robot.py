@@ -387,11 +387,7 @@ class SampledRobot(SimulatedRobot):
 
     def _lies_there(self, name: str) -> bool:
         if name in self.here.gone:  # there may have been several of the same kind
-            fact = SampledFact('another "{}" is in "{}"', (name, self.room), is_random=False)
-            if not self.sampler.strict and fact not in self.facts:
-                self.has_assumed = True
-                self.facts.append(fact)
-            return not self.sampler.strict
+            return not self.sampler.strict and self.settle(f"another {name}", self.room, is_random=False)
         return self.settle(name, self.room, is_random=self.sampler.strict)
 
     def put(self, obj: str) -> None:
