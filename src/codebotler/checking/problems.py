@@ -153,7 +153,7 @@ class CheckResult:
 
     @property
     def assumption(self) -> str:
-        """What the program takes for granted and all samples suppose, in a sentence; empty if nothing."""
+        """A sentence that lists the facts which the program takes for granted; empty if there are none."""
         facts = (one.sentence for sample in self.samples for one in sample.facts if not one.is_random)
         found = listed(elide_list([*dict.fromkeys(facts)], MAX_ASSUMED_FACTS))
         return f"The program takes for granted that {found}." if found else ""

@@ -25,7 +25,7 @@ class ProgramlessReply:
 
     @property
     def can_repair(self) -> bool:
-        """Whether the model may do better if it is told the reason; False after a content filter."""
+        """Whether sending the reason to the model may help. False after a content filter."""
         return self.kind != "filtered"
 
 

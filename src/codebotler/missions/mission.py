@@ -271,7 +271,7 @@ class Mission:
             outcome = self._run_program(live) if drive is None else drive(live)
         except BaseException as error:  # noqa: BLE001 - any error must stop the robot
             try:
-                if not isinstance(error, StoppedError):  # then the robot has been told already
+                if not isinstance(error, StoppedError):  # else a press has already stopped the robot
                     live.stop()
             finally:
                 self._end(

@@ -53,7 +53,7 @@ class FaceQuestion:
 
 @dataclass(frozen=True)
 class FaceState:
-    """What all screens show: the last three sentences, the open question, and the last closed question."""
+    """The content of all screens: the last three sentences, the open question and the last closed one."""
 
     said: tuple[FaceSentence, ...] = ()
     question: FaceQuestion | None = None

@@ -48,7 +48,7 @@ def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True)
 
 @dataclass
 class ExploredRoom:
-    """What a program has found out about one room. All names have the form that `normalized` returns."""
+    """The facts about one room that a program knows. All names have the form that `normalized` returns."""
 
     missed: set[str] = field(default_factory=set)  # looked for and not found
     gone: set[str] = field(default_factory=set)  # picked up here

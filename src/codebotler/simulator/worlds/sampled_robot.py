@@ -105,7 +105,7 @@ class SampledRobot(SimulatedRobot):
 
     @property
     def here(self) -> ExploredRoom:
-        """What the program has found out about the robot's current room."""
+        """The facts about the robot's current room that the program knows."""
         return self.explored[self.room]
 
     def search(self, name: str) -> RoomSearch:
