@@ -20,6 +20,7 @@ from codebotler.robots.base import ROS_PYTHON
 from codebotler.robots.ros.caller import calls_data
 from codebotler.robots.ros.connections.connection import default_connection
 from codebotler.robots.ros.worker import WORKERS_FOLDER
+from ros_graph import forget_goals
 
 ROS_SIDE = Path(__file__).parent / "bridge_to_ros.py"
 
@@ -36,6 +37,7 @@ class Bridge:
         self._handle = handle
         self._server = serve(self._talk, "127.0.0.1", 0)
         self.address = f"ws://127.0.0.1:{self._server.socket.getsockname()[1]}"
+        forget_goals("rosbridge", self.address)
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
         self._thread.start()
 

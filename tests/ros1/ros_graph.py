@@ -17,6 +17,7 @@ from typing import Any
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.robots.base import ROS_PYTHON, Options
+from codebotler.robots.reservation import robot_file
 from codebotler.robots.ros import kinds
 from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.robot import RosRobot
@@ -35,6 +36,16 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+def forget_goals(robot: str, address: str) -> None:
+    """Delete what killed connections left about their goals, which ended with their servers.
+
+    The system hands out each port again, and then another test would have to cancel these goals.
+    """
+    ours = robot_file(robot, address, "goal")
+    for sign in ours.parent.glob(f"{ours.stem}.*.goal"):
+        sign.unlink()
 
 
 class Process:
@@ -94,6 +105,7 @@ class Graph:
         self.uri = f"http://localhost:{self.port}"
         self.processes: list[Process] = []
         self.robots: list[RosRobot] = []
+        forget_goals("ros1", self.uri)
         self.start_master()
 
     def start_master(self) -> None:

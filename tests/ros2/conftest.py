@@ -12,10 +12,10 @@ from tempfile import gettempdir
 import pytest
 
 from codebotler.core.skills.paper import SKILLS
-from codebotler.robots.reservation import robot_file
 from codebotler.robots.ros.kinds import INSTALL_ROS2, ROS2_MODULES
 from codebotler.robots.ros.worker import find_missing
 from ros2_scene import PROFILE, ROS2_PYTHON, Scene, installed
+from ros_graph import forget_goals
 
 HERE = Path(__file__).parent
 DOMAINS = range(41, 100)  # Each test process has a separate graph.
@@ -60,6 +60,4 @@ def scene() -> Iterator[Scene]:
         yield scene
     finally:
         scene.end()
-        ours = robot_file("ros2", os.environ["ROS_DOMAIN_ID"], "goal")
-        for sign in ours.parent.glob(f"{ours.stem}.*.goal"):  # These goals ended with their servers.
-            sign.unlink()
+        forget_goals("ros2", os.environ["ROS_DOMAIN_ID"])
