@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from codebotler.core.skills.declaration import by_event
@@ -14,6 +15,7 @@ from codebotler.core.trace import Trace
 from codebotler.missions.display.view import SessionView
 from codebotler.missions.preflight import ask_rooms, is_resumable
 from codebotler.missions.session import MissionSession
+from codebotler.missions.stop import StopButton
 from codebotler.missions.storage.log import SKILL_END_EVENTS, LogLine, MissionState
 from codebotler.missions.storage.past import MissionPast, read_past
 from codebotler.missions.storage.store import find_mission
@@ -82,16 +84,21 @@ def past_to_recover(session: MissionSession, robot: Robot, home: Path) -> Missio
     return read_past(find_mission(home, session.view.id), robot.skills, robot.name)
 
 
-def ask_evidence(robot: Robot, home: Path, past: MissionPast, remark: Callable[[str], None]) -> list[str]:
+def ask_evidence(
+    robot: Robot, home: Path, past: MissionPast, remark: Callable[[str], None], stop_button: StopButton
+) -> list[str]:
     """Return sentences that help a person to decide whether the step `past.unsure` happened.
 
-    A real robot is asked where it is, unless it is in use. `remark` receives likely mistakes in its setup.
+    A real robot is connected and asked where it is, unless it is in use or `stop_button` is pressed.
+    `remark` receives likely mistakes in its setup.
     """
     before = [past.last_position_text] if past.last_position_text else []
     if is_resumable(robot):  # it knows no more than the log
         return [*before, "A simulated robot cannot say. If the step happened, the robot will not repeat it."]
     try:
-        with Reservation(robot, home):
+        attach = partial(stop_button.attach, robot)
+        with Reservation(robot, home, attach):
+            attach()  # again, since a press may have come before the robot was connected
             place = ask_rooms(robot, remark)[1]
     except (NotReadyError, OSError) as error:
         remark(str(error))

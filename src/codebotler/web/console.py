@@ -24,8 +24,9 @@ from codebotler.core.world import World
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.display.wording import BY_PAGE, capitalize
 from codebotler.missions.mission import BY_SHUTDOWN, STOP_GRACE_SECONDS, MissionError
-from codebotler.missions.recovery import PriorApproval, past_to_recover
+from codebotler.missions.recovery import PriorApproval, ask_evidence, past_to_recover
 from codebotler.missions.session import MissionSession
+from codebotler.missions.stop import StopButton
 from codebotler.missions.storage.log import MissionState, MissionSummary
 from codebotler.missions.storage.past import MissionPast, read_past
 from codebotler.missions.storage.store import find_interrupted, find_mission
@@ -91,6 +92,7 @@ class Console:
         self._stopped: MissionSession | None = None  # the session at the last hold in this process
         self._lost: MissionSession | None = None  # whose robot may still move
         self._stopping = threading.Thread()  # sends a stop to that robot
+        self._asking: StopButton | None = None  # of a robot that is asked where it is
         self._began = 0.0  # the time at which the current session began
         self.used_elsewhere = ""  # a sentence about the process that used the robot at the last STOP
 
@@ -109,6 +111,8 @@ class Console:
             session, self._may_recover = self.session, None
             self._end_hold()
             lost = self._forget_loss()
+        if (asking := self._asking) is not None:
+            asking.press(BY_SHUTDOWN)
         if lost is not None:
             lost.stop_soon(BY_SHUTDOWN).join(STOP_GRACE_SECONDS)
         self._hold.close()
@@ -213,6 +217,14 @@ class Console:
             model = "" if program else model or known
         return MissionOrder(past.instruction, model, program, author, past=past)
 
+    def ask_evidence(self, past: MissionPast, remark: Callable[[str], None]) -> list[str]:
+        """Return what helps a person to say whether an unsure step happened. A STOP reaches the robot."""
+        button = self._asking = StopButton()
+        try:
+            return ask_evidence(self.robot, self.home, past, remark, button)
+        finally:
+            self._asking = None
+
     def _recover(self, session: MissionSession) -> None:
         """Begin the rest of a mission while skills fail, and approve what the latest approval allows."""
         approval: PriorApproval | None = None
@@ -273,14 +285,17 @@ class Console:
         with self._lock:
             session, self._may_recover = self.session, None
             lost = self._forget_loss()
-            is_active = session is not None and not session.view.is_over
+            asking = self._asking
+            is_active = asking is not None or (session is not None and not session.view.is_over)
             other = "" if is_active or lost is not None else Reservation(self.robot, self.home).holder()
             self.used_elsewhere = other and f"another tool ({other}) uses the robot"
             is_approved = session is not None and session.view.is_approved
             may_move = lost is not None or bool(self._hold.warning or other)
-            stops = not only_moving or may_move or is_approved
+            stops = not only_moving or may_move or is_approved or asking is not None
             if session is not None and is_active and stops:
                 session.stop_soon(by)
+            if asking is not None:
+                threading.Thread(target=asking.press, args=(by,), daemon=True).start()
             if lost is not None and not self._stopping.is_alive():
                 self._stopping = lost.stop_soon(by)
             if holds and stops:

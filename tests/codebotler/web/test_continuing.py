@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -19,12 +21,20 @@ from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.mission import MissionError
 from codebotler.missions.recovery import ask_evidence, is_recoverable
 from codebotler.missions.session import MissionSession
+from codebotler.missions.stop import StopButton
 from codebotler.missions.storage.log import MissionState, MissionSummary
 from codebotler.missions.storage.past import MissionPast
 from codebotler.models.base import Model, ModelError, Reply, TextListener, Usage, ignore_text
 from codebotler.models.sampling import SamplingSettings
 from codebotler.prompts import Prompt
-from codebotler.robots.base import Robot
+from codebotler.robots.base import (
+    CancelledError,
+    Feedback,
+    Robot,
+    RobotArgument,
+    RobotResult,
+    ignore_feedback,
+)
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.web import console as console_module
@@ -201,15 +211,50 @@ def test_evidence_comes_from_the_robot_and_the_log(tmp_path: Path) -> None:
         Event("pick", "mug", place="kitchen"),
     )
     past = MissionPast("1", "", "", TYPED, "", trace, "study", Event("say", "hello", place="study"))
-    log, robot_says = ask_evidence(robot, tmp_path, past, lambda _: None)
+    log, robot_says = ask_evidence(robot, tmp_path, past, lambda _: None, StopButton())
     assert "study" in log
     assert "mug" in log
     assert "hall" in robot_says
     noted: list[str] = []
     with Reservation(robot, tmp_path):
-        assert "hall" not in ask_evidence(robot, tmp_path, past, noted.append)[1]
+        assert "hall" not in ask_evidence(robot, tmp_path, past, noted.append, StopButton())[1]
     assert len(noted) == 1
-    assert "hall" not in str(ask_evidence(Simulated(WORLD), tmp_path, past, noted.append))
+    assert "hall" not in str(ask_evidence(Simulated(WORLD), tmp_path, past, noted.append, StopButton()))
+
+
+class Silent(Immovable):
+    """A robot that does not say where it is until it is cancelled."""
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world, speed=None)
+        self.was_asked, self.was_cancelled = threading.Event(), threading.Event()
+
+    def perform(
+        self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
+    ) -> RobotResult:
+        if skill != "get_current_location":
+            return super().perform(skill, arguments, feedback)
+        self.was_asked.set()
+        assert self.was_cancelled.wait(10)
+        raise CancelledError
+
+    def cancel(self) -> None:
+        super().cancel()
+        self.was_cancelled.set()
+
+
+def test_stop_reaches_a_robot_that_is_asked_where_it_is(tmp_path: Path) -> None:
+    robot, noted = Silent(WORLD), list[str]()
+    past = MissionPast("1", "", "", TYPED, "", (), "", Event("say", "hello", place="study"))
+    with Console(robot, tmp_path, lambda _: Author()) as console, ThreadPoolExecutor(1) as pool:
+        evidence = pool.submit(console.ask_evidence, past, noted.append)
+        assert robot.was_asked.wait(10)
+        assert console.stop("a person", only_moving=True, holds=True)
+        assert evidence.result(10)
+        assert console.used_elsewhere == ""
+        assert len(noted) == 1
+        assert console.is_held
+        assert not console.stop("a person")
 
 
 # --- recovery without a person

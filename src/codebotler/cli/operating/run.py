@@ -18,7 +18,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import busy, confirm, note, print_rich, read_line, shortened
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.mission import STOP_GRACE_SECONDS, MissionError
-from codebotler.missions.recovery import PriorApproval, ask_evidence, past_to_recover
+from codebotler.missions.recovery import PriorApproval, past_to_recover
 from codebotler.missions.session import MissionSession
 from codebotler.missions.storage.log import MissionState
 from codebotler.missions.storage.past import MissionPast
@@ -260,7 +260,7 @@ def choose_past(console: Console, name: str, program: str) -> MissionPast:
         return past
     if program == "-":
         raise UserError(f"{past.unsure_step_text}; name a file for the rest, since a person must answer here")
-    for sentence in (past.unsure_step_text, *ask_evidence(console.robot, console.home, past, note)):
+    for sentence in (past.unsure_step_text, *console.ask_evidence(past, note)):
         note(sentence)
     happened = _ask_whether(past)
     while happened and past.answers:

@@ -14,7 +14,6 @@ from codebotler.core.trace import Event
 from codebotler.missions.display.view import SessionView
 from codebotler.missions.display.wording import capitalize
 from codebotler.missions.mission import MissionError
-from codebotler.missions.recovery import ask_evidence
 from codebotler.missions.storage.log import MissionState, MissionSummary
 from codebotler.missions.storage.past import MissionPast
 from codebotler.web.console import Console
@@ -50,7 +49,7 @@ class ContinueButton(Button):
         if past.unsure is None:
             self._begin(past)
             return
-        evidence = await asyncio.to_thread(ask_evidence, console.robot, console.home, past, note)
+        evidence = await asyncio.to_thread(console.ask_evidence, past, note)
         if not self.is_deleted:
             with self:
                 self._ask(past, evidence)
