@@ -19,6 +19,7 @@ from codebotler.core.skills.paper import SKILLS
 from codebotler.core.text.text_template import ANY_TEXT
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
+from codebotler.missions.display.progress import Find
 from codebotler.missions.display.view import MissionOrder, SessionView
 from codebotler.missions.mission import Mission
 from codebotler.missions.recovery import PriorApproval
@@ -46,6 +47,17 @@ def task_program():
     if ask("Anne", "A mug?", ["yes", "no"]) == "no":
         say("Never mind.")
     place("mug")
+    go_to("nowhere")
+"""
+FIND = """
+def task_program():
+    is_in_room("pen")
+    go_to("kitchen")
+    is_in_room("mug")
+    pick("mug")
+    go_to("lab")
+    place("mug")
+    ask("Anne", "A mug?", ["no"])
     go_to("nowhere")
 """
 YES_NO = (Option("yes"), Option("no"))
@@ -81,6 +93,15 @@ def test_past_lists_steps_with_their_places_and_answers(tmp_path: Path) -> None:
     assert [one.failed for one in past.trace if one.failed] == ["GoToInvalidLocation"]
     assert (past.place, past.held, past.unsure, past.program) == ("lab", "", None, BRING)
     assert past.why.startswith("GoToInvalidLocation")
+
+
+def test_a_continuation_knows_what_was_found(tmp_path: Path) -> None:
+    now = read_past(fail(tmp_path, FIND), SKILLS).progress
+    assert (now.room, now.held, now.has_begun) == ("lab", "", False)
+    assert set(now.finds) == {Find("lab", "mug"), Find("lab", "Anne")}
+    folder = fail(tmp_path, FIND)
+    cut(folder, line_of(folder, "pick", "skill") - 1)
+    assert read_past(folder, SKILLS).progress.finds == (Find("kitchen", "mug"),)
 
 
 @pytest.mark.parametrize(("skill", "held"), [("pick", "mug"), ("say", "mug"), ("place", "")])

@@ -32,7 +32,7 @@ class SharedView:
 
     @property
     def view(self) -> SessionView:
-        """The current view."""
+        """The current state of the mission, as page and terminal show it."""
         return self._view
 
     @property

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from codebotler.core.errors import RobotError, UserError
+from codebotler.core.skills.declaration import by_event
 from codebotler.core.skills.kinds import PICK, PLACE
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.terminal import shortened
@@ -76,8 +77,14 @@ class MissionPast:
 
     @property
     def progress(self) -> Progress:
-        """The progress with which the new mission begins: the robot's place and the object in its hand."""
-        return Progress(room=self.place, held=self.held)
+        """The progress with which the new mission begins: the robot's place, its hand, and what it found."""
+        now = Progress()
+        for event in self.trace:
+            row = by_event(event.kind)
+            if row is not None and not event.failed:
+                subject = event.text if event.to is None else event.to
+                now = replace(now, room=event.place, skill=row.name, subject=subject).with_result(event.found)
+        return Progress(room=self.place, held=self.held, finds=now.finds)
 
     @property
     def steps(self) -> list[str]:
