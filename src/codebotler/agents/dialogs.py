@@ -68,7 +68,9 @@ async def find_question(ctx: AgentContext) -> OpenQuestion:
     session = gatekeeper_of(ctx).console.session
     view = None if session is None else session.view
     if session is None or view is None or view.question is None or not view.waits_for_answer:
-        raise ToolError("no mission waits for a choice between behaviours; call follow_mission")
+        raise ToolError(
+            "no mission waits for a choice between behaviours; call follow_mission to see its state"
+        )
     return OpenQuestion(session, view.question)
 
 

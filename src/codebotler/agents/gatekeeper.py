@@ -176,10 +176,9 @@ class Gatekeeper:
         return self.check(made.reply.program)
 
     async def run_exclusively(self, kind: str, work: Callable[[], _Made]) -> _Made:
-        """Return the result of slow work on a new thread. Raise MissionError if work of this `kind` goes on.
+        """Return the result of slow work. Raise MissionError if other work of this `kind` is under way.
 
-        The few threads of the SDK and of the event loop stay free for people, and a person's check never
-        waits for many checks of agents.
+        The work has a thread of its own, so that requests of people never wait for it.
         """
         if kind in self._under_way:
             raise MissionError(f"another {kind} is under way; try again when that is over")

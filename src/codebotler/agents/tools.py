@@ -108,11 +108,11 @@ async def write_program(instruction: _Instruction, ctx: AgentContext) -> CheckRe
 async def propose_mission(
     ctx: AgentContext, instruction: _Instruction = "", program: _Program = ""
 ) -> MissionReport:
-    """Propose a mission, which checks the program and shows it to a person. The robot does not move.
+    """Propose a mission: the program is checked and shown to a person. The robot does not move.
 
     Without a program, CodeBotler's model writes one, if a model is configured.
-    The answer has the problems, storyboards, and a digest. You cannot approve it yourself. Call run_mission,
-    which waits until a person has approved exactly this program.
+    You get the problems, storyboards and a digest. You cannot approve it yourself. Call run_mission, which
+    waits until a person has approved exactly this program.
     """
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors(), gatekeeper.waiting():

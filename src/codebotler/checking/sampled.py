@@ -51,7 +51,7 @@ class UnwantedCheckError(Exception):
 
 
 class SampledRuns:
-    """The runs of one program in sampled worlds, which a worker executes as one job."""
+    """Prepares one program's runs in sampled worlds as a job for a worker, and collects their samples."""
 
     def __init__(
         self, program: str, room_map: RoomMap, samplers: Sequence[FactSampler], settings: CheckSettings

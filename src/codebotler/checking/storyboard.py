@@ -20,7 +20,7 @@ STEP_MARK = "❱"
 
 
 def steps_of(trace: Trace, *, has_places: bool = False) -> list[dict[str, Any]]:
-    """Convert the events of a trace to dictionaries, numbered from 1 and, if `has_places`, with rooms."""
+    """Convert a trace to a list of steps, numbered from 1. With `has_places`, each step names its room."""
     return [_step_data(number, event, has_places=has_places) for number, event in enumerate(trace, 1)]
 
 

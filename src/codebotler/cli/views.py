@@ -127,7 +127,7 @@ def list_view(summaries: Sequence[MissionSummary]) -> RenderableType:
 def mission_view(
     summary: MissionSummary, events: Sequence[LogLine], rest: MissionSummary | None = None
 ) -> RenderableType:
-    """Return a mission's program, events and end, and the end of the mission that continued it, if any."""
+    """Return a view of a mission: its program, its events, how it ended, and how its `rest` ended."""
     head = Text.assemble((f"mission {summary.id}", "bold"), f" on the robot {summary.robot}")
     if summary.instruction:
         head.append(f"\n{shortened(summary.instruction)}")

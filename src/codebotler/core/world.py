@@ -75,8 +75,8 @@ class World:
         robot: the room where the robot starts.
         about: a short description.
         may_wait_forever: whether a program may wait in this world for something that never happens.
-        truths: pairs of a statement and its value, such as `read_gauge("boiler")` and 3.
-        traits: for things and people with properties, pairs of the name and its properties.
+        truths: calls of own skills and what they return, such as `("read_gauge("boiler")", 3)`.
+        traits: the properties of things and people, such as `("apple", (Trait("kind", "fruit"),))`.
     """
 
     rooms: tuple[Room, ...]

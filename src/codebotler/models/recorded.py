@@ -126,7 +126,7 @@ class RecordedModel:
 
 
 def find_closest(instruction: str, known: Iterable[str]) -> list[str]:
-    """Return up to three known instructions that share the most long words with `instruction`."""
+    """Return the three known instructions that have most words of four or more letters in common."""
     words = {*LONG_WORD.findall(instruction.lower())}
 
     def rank(other: str) -> tuple[int, int]:

@@ -92,7 +92,7 @@ class Prompt:
         return replace(self, messages=(*self.messages, answer, request), text=text)
 
     def after_no_program(self, why: str) -> Prompt:
-        """Return this request with the reason why the last reply had no program, for chat models only."""
+        """Return this chat prompt with the reason why the last reply had no program."""
         *before, request = self.messages
         asked = f"{request.text}\n\n{fill_template('no-program', why=why)}"
         return replace(self, messages=(*before, replace(request, text=asked)))

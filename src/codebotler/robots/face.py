@@ -91,7 +91,7 @@ class Face:
             self._add_screens(-1)
 
     def open(self) -> None:
-        """Clear the face, so that a new mission can say and ask something."""
+        """Begin a new mission with an empty face. Until `withdraw`, the robot can say and ask something."""
         with self._lock:
             self._is_open = True
             self._show(FaceState())

@@ -65,7 +65,7 @@ class Monitor:
         return self.holds
 
     def would_hold(self, event: Event) -> bool:
-        """Whether the formula would hold after an event; raise Inconclusive if an option is not a string."""
+        """Whether the formula would hold after an event. Raise Inconclusive if that cannot be decided."""
         return self._machine.step(self._state, self._machine.mask(event, self._seen))[1]
 
 

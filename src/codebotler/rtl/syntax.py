@@ -282,7 +282,10 @@ class _Parser(FormulaSource):
             case ast.Call(ast.Name(name)) if name.endswith("number"):
                 arguments = self.arguments(node, node, name)
                 if len(arguments) < 2:  # noqa: PLR2004 - the number and the thing
-                    raise self.error(node, f"{name} takes a number, a thing and optionally other things")
+                    raise self.error(
+                        node,
+                        f"{name} takes a number and one or more words for what is counted",
+                    )
                 number, (thing, *others) = self.number(arguments[0]), map(self.word, arguments[1:])
                 return Number(number, thing, tuple(others), name == "othernumber")
             case ast.Call(ast.Name(name)) if name.endswith("time"):
@@ -343,7 +346,7 @@ class _Parser(FormulaSource):
 
     def arguments(self, call: ast.Call, at: ast.expr, name: str, wanted: int | None = None) -> list[ast.expr]:
         for keyword in call.keywords:
-            raise self.error(keyword.col_offset, "RTL has no keyword arguments; remove the name")
+            raise self.error(keyword.col_offset, f"RTL has no keyword arguments; remove `{keyword.arg}=`")
         found = len(call.args)
         if wanted is not None and found != wanted and name == self.question:
             hint = f'{name} takes a question and an option, as in {name}("tea", ".*")'

@@ -43,7 +43,7 @@ class SkillPerformer(Protocol):
         """Execute one skill, and return its result. Raise RobotError if the skill fails."""
 
     def sleep_until(self, now: float) -> None:
-        """Let time pass until `now` seconds since the start, or until the robot is stopped."""
+        """Let time pass until the clock shows `now`, in seconds since the start, or the robot is stopped."""
 
 
 def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, float, bool]:

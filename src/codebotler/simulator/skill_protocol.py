@@ -126,7 +126,9 @@ def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
 def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:
     """Convert a call's arguments for the robot. Raise ProtocolError if they do not fit the skill."""
     if len(values) != len(skill.parameters):
-        raise ProtocolError("a skill call has the wrong number of arguments")
+        raise ProtocolError(
+            f"a call of {skill.name} has {len(values)} arguments, not {len(skill.parameters)}"
+        )
     arguments: list[Argument] = []
     for parameter, value in zip(skill.parameters, values, strict=True):
         if parameter.is_options and isinstance(value, list):

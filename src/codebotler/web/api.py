@@ -147,7 +147,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.get("/missions/{mission}")
     def show(mission: str) -> dict[str, Any]:
-        """Return the current mission with its check, or the summary of a past mission."""
+        """Return a mission's summary, given its ID. For the current mission, also return its check."""
         view = console.view
         if mission in {_CURRENT, view.id}:
             return view_data(view)

@@ -48,10 +48,10 @@ class Chances:
 
 
 def final_chances(prompt: CheckedPrompt, retries: int) -> Chances:
-    """Compute the probabilities for a prompt, if each request returns one of its completions at random.
+    """Return the chances of a prompt's final program under rejection sampling.
 
-    A completion is final if it is accepted or if no retry is left. Without retries, the probability of
-    passing equals the prompt's pass@1.
+    Each request returns one of the prompt's completions at random. The final program is the first one that
+    the check accepts, or the last one. Without retries, `passed` equals the prompt's pass@1.
     """
     asked, is_last = mean_requests(prompt.rejected, retries), prompt.rejected**retries
 

@@ -33,7 +33,7 @@ class TraceMatch:
 
 
 def search_row(row: Mapping[str, Any], query: TraceQuery) -> TraceMatch:
-    """Search a completion's row. Return the worlds that match, and those whose trace was not stored."""
+    """Return in which worlds a completion matches a query, and in which ones no trace was stored."""
     formula = query.formula
     worlds, cut = [], []
     verdicts = [*_verdicts_in_scope(row, query)]

@@ -80,9 +80,9 @@ def expect_same_suite(opened: Sequence[Results], suite: str) -> None:
     if len({*digests}) > 1:
         now = opened[0].required_suite.digest
         stale = next(one for one, digest in zip(opened, digests, strict=True) if digest != now)
-        why = "was judged by another version of the suite than other runs"
+        why = "this run was judged by another version of the suite"
         again = evaluate_again(stale, suite)
-        raise UserError(f"{why}; `{again} --redo` judges with the current one", file=stale.run.path)
+        raise UserError(f"{why}; `{again} --redo` judges it again", file=stale.run.path)
 
 
 def open_run(

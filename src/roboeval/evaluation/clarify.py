@@ -47,10 +47,10 @@ class ClarifySettings:
 
 
 class ClarifyShares(TypedDict):
-    """Pass rates from 0 to 1 with and without a clarifying question. In a mean, all prompts count equally.
+    """Pass rates from 0 to 1 with and without a clarifying question. All prompts count equally.
 
-    `mattered` is the share of questions that change the verdict: either the program of the answer passes, or
-    that of the largest cluster, but not both. `mattered` is None if no question was asked.
+    `mattered` is the share of questions whose answer changes the verdict, compared with the program of the
+    largest cluster. It is None if no question was asked.
     """
 
     one: float  # the share of single candidates that pass

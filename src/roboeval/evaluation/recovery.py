@@ -46,7 +46,7 @@ class FaultResult:
 
 @dataclass(frozen=True)
 class Interruption:
-    """A mission that ended because a skill call failed, with what a model needs to write the rest."""
+    """A mission that a failed skill call ended, and what happened before, for the prompt of the rest."""
 
     result: FaultResult  # which mission, and which fault
     scenario: Scenario = field(repr=False)  # its world, and what its prompt asks for

@@ -159,9 +159,9 @@ REWARD_CACHE: dict[bytes, Components] = {}
 
 
 def judge_works(works: Sequence[RewardWork], progress: Callable[[int], object] = bool) -> list[Components]:
-    """Return the reward and components of each program, in order. Programs with the same name run once.
+    """Return the reward and its components for each work, in order. Works with the same name run once.
 
-    Results are cached. `progress` is called with the number of distinct programs that are done so far.
+    Results are kept in `REWARD_CACHE`. `progress` is called with the number of finished distinct programs.
     """
     distinct = {work.name: work for work in works}
     known = {name: found for name in distinct if (found := REWARD_CACHE.get(name)) is not None}

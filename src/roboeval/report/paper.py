@@ -77,7 +77,7 @@ def _column(model: str) -> int:
 
 
 def published_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table that compares runs of the paper's models with the published means by task."""
+    """Build the table that compares each task's pass@1 with the paper's, for runs of the paper's models."""
     known = [(run, model) for run in runs if (model := model_of(run)) is not None]
     rows: list[list[Cell]] = []
     for run, model in known:

@@ -93,7 +93,7 @@ class Snapshot:
 
     @property
     def suite(self) -> Suite | None:
-        """The suite that judges the run, or None if it is unavailable."""
+        """The suite that judged the run, or None if it cannot be loaded, for example after its removal."""
         return self.results.suite
 
     @cached_property

@@ -64,7 +64,7 @@ class Request:
             raise UserError("standard input cannot hold both the program and your approval; add --yes")
 
     def order_on(self, console: Console) -> MissionOrder:
-        """Convert the request to an order for the console. A program file or standard input is read now."""
+        """Return the mission to begin on the console. This reads the program file or standard input."""
         program = read_program(self.what) if self.is_program else ""
         if self.past is not None:
             return console.rest_of(self.past, program)
@@ -259,7 +259,9 @@ def choose_past(console: Console, name: str, program: str) -> MissionPast:
     if past.unsure is None:
         return past
     if program == "-":
-        raise UserError(f"{past.unsure_step_text}; name a file for the rest, since a person must answer here")
+        raise UserError(
+            f"{past.unsure_step_text}; name a program file instead of `-`, since a person must answer here"
+        )
     for sentence in (past.unsure_step_text, *console.ask_evidence(past, note)):
         note(sentence)
     happened = _ask_whether(past)

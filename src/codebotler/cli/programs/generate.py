@@ -177,7 +177,7 @@ def ask_which(question: ClarifyingQuestion, read_line: Callable[[str], str]) -> 
     while True:
         line = read_line(f'Answer {numbers}, "none" or "you decide": ')
         if not line:
-            raise UserError("no answer was given; `you decide` takes the first one")
+            raise UserError("no answer was given; `you decide` takes the first option")
         try:
             return question.parse(line)
         except UserError as error:

@@ -74,7 +74,7 @@ class RosRobot(RosCaller):
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Perform a skill by examining a picture, looking up places and the pose, or calling the robot."""
+        """Perform a skill with a camera, the list of places or a ROS call, as the connection file says."""
         connection = self.connection
         if skill in connection.cameras:
             topic, model = connection.cameras[skill]

@@ -126,7 +126,7 @@ class TranscribedRun(ProgramRun):
         self.refuel()
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Execute a skill on this process's copy of the robot (or ask the engine). Return its result."""
+        """Execute a skill, if possible on this process's copy of the robot, and return its result."""
         given = [
             _robot_argument(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)
         ]

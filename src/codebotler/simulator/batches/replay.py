@@ -104,7 +104,7 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
 def _frame(child: IsolatedProcess) -> bytes:
     frame = child.receive_bytes(MAX_FRAME)
     if frame is None:
-        raise LostProcessError("the process of a batch ended too early")
+        raise LostProcessError("the process of a batch of runs ended before its last run")
     return frame
 
 
@@ -155,7 +155,7 @@ class Replay:
 
     def _let_time_pass(self, now: float) -> None:
         if now < self.robot.now:
-            raise ProtocolError("a transcript reports an earlier time than before")
+            raise ProtocolError("in a transcript, the clock goes backwards")
         if self.ledger.limit is None:
             self.ledger.let_time_pass(now)
 
@@ -164,9 +164,9 @@ class Replay:
         skill = self.robot.skills.get(call.skill)
         known = () if skill is None else skill.parameters
         if skill is None or len(known) != len(call.arguments) or not all(map(_fits, known, call.arguments)):
-            raise ProtocolError("a transcript calls an unknown skill, or one with wrong arguments")
+            raise ProtocolError(f'a transcript has an invalid call of "{call.skill[:100]}"')
         if call.kind == "ask" and call.skill not in self._own:
-            raise ProtocolError("the child has asked for a skill that it can perform itself")
+            raise ProtocolError("the program's process asks the engine for a skill that it has itself")
         value = tuple(call.value) if call.kind == "error" and isinstance(call.value, list) else call.value
         arguments: Any = call.arguments  # checked above
         return call.skill, arguments, call.now, None if call.kind == "ask" else (call.kind, value)

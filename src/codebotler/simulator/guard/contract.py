@@ -96,7 +96,7 @@ class SkillBound:
     def excess_over(self, other: SkillBound) -> SkillBound | None:
         """Return the part of this bound that the other bound forbids, or None if it forbids nothing.
 
-        If this bound is wider in several ways, such as more rooms and more calls, return all of it.
+        If this bound is wider in several ways, such as more rooms and more calls, return the whole bound.
         """
         added: list[tuple[str, Templates]] = []
         for (name, templates), (_, allowed) in zip(self.texts, other.texts, strict=True):

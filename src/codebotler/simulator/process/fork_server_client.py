@@ -104,7 +104,7 @@ class ForkServer:
         self._end_is_unread = True
         pid = self._read_report()
         if pid <= 1:  # a signal to such an id would reach a whole group of processes
-            raise LostProcessError("the fork server did not report which process it forked")
+            raise LostProcessError("the fork server did not report the ID of its new process")
         return pid
 
     def _end_of_child(self) -> int:

@@ -51,7 +51,7 @@ class IsolatedCallError(Exception):
 
 
 class IsolatedFunction(Generic[_Arguments, _Result]):
-    """A function that runs in a closed process, made by the decorator `isolated`."""
+    """A function that runs in a sandboxed process; made by the decorator `isolated`."""
 
     def __init__(self, function: Callable[_Arguments, _Result], rehearsal: tuple[Any, ...]) -> None:
         self.function, self.rehearsal = function, rehearsal

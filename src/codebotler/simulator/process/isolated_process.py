@@ -131,7 +131,7 @@ class IsolatedProcess:
             self.close_channel()
 
     def end_gently(self) -> int:
-        """Kill the process if it does not exit within 0.1 seconds. Return what `end` returns."""
+        """Give the process 0.1 seconds to exit, then kill it. Return its exit status, as `end` does."""
         for _ in range(50):
             if _stat(self.pid)[:1] in ([], ["Z"]):
                 break

@@ -262,7 +262,7 @@ def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: ty
     if (given is int and not -MAX_EXACT_INT <= value <= MAX_EXACT_INT) or (
         given is float and value - value != 0
     ):
-        raise ValueError(f"{name}: {named} is out of range (infinite, not a number or beyond 2**53)")
+        raise ValueError(f"{name}: {named} must be a number between -2**53 and 2**53")
 
 
 def _value_text(value: Any) -> str:  # noqa: ANN401 - a scalar or a list of them

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def give_up_rights(memory: int = MEMORY) -> None:
-    """Permanently drop the privileges that neither this process nor its children need."""
+    """Permanently drop this process's privileges. `memory` limits its address space, in bytes."""
     for name in ("CORE", "FSIZE", "MEMLOCK", "MSGQUEUE"):
         set_limit(name, 0)
     set_limit("AS", memory)
@@ -71,7 +71,7 @@ def die_with_parent() -> None:
 
 
 def refuse_new_rights() -> None:
-    """Never gain privileges by executing a program, such as a setuid program."""
+    """Prevent this process from gaining privileges when it executes another program, such as sudo."""
     prctl(PR_SET_NO_NEW_PRIVS, 1)
 
 

@@ -67,11 +67,11 @@ OWN_SCOPES = (ast.FunctionDef, ast.Lambda, ast.ListComp, ast.DictComp, ast.Gener
 
 
 class WildError(Exception):
-    """A part of a program is not on the allowlist, so the program is wild."""
+    """Raised if a program contains a construct that is not on the allowlist: the program is wild."""
 
 
 def wild(*_: object) -> NoReturn:
-    """Reject a part of a program: raise WildError."""
+    """Raise WildError, because the program contains a construct that is not on the allowlist."""
     raise WildError
 
 

@@ -81,5 +81,5 @@ class Draw:
         return [replace(self, result=result) for result in results if result != self.result]
 
     def holds_in(self, sampler: FactSampler) -> bool:
-        """Return whether a sampler chooses the same result for this fact."""
+        """Return whether a sampler, which stands for a world, decides this fact in the same way."""
         return sampler.decide(self.method, *self.arguments).result == self.result

@@ -33,10 +33,10 @@ class SkillGuard(Protocol):
         """Let a robot execute one skill, or raise RobotError if it is forbidden."""
 
     def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
-        """Raise RobotError if an action inside one of the user's own skills is forbidden."""
+        """Raise RobotError if a house rule forbids an event that happens inside a skill of the user."""
 
     def find_first_unkept(self) -> RobotError | None:
-        """Return an error if the run breaks a rule by ending now, or None if it breaks none."""
+        """Return an error for the first rule that would be broken if the run ended now, or None."""
 
 
 class SimulatedRobot(SimulatedWorld):

@@ -235,7 +235,7 @@ class SampledRobot(SimulatedRobot):
         return self.room_map.things if sort == "thing" else self.room_map.people
 
     def room_for(self, request: str) -> str | None:
-        """Return the room that a request means, or None. If the map is guessed, unknown rooms exist too."""
+        """Return the room that a request means, or None. A guessed map has a room for every request."""
         return self.room_map.room(request)
 
     def look(self, entity: str) -> bool:
@@ -373,7 +373,7 @@ class SampledRobot(SimulatedRobot):
         return is_there
 
     def take(self, obj: str) -> None:
-        """Pick up an object, which is here unless an earlier look failed (in strict worlds, at random)."""
+        """Pick up an object. It is here unless a look has not found it; in strict worlds, chance decides."""
         name = normalized(obj)
         if self.held is None and self.is_here(name) is None and self._lies_there(name):
             self._add(name, self.room)

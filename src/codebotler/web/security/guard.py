@@ -163,7 +163,9 @@ class Guard:
         changes = is_socket or request.scope["method"] not in _SAFE_METHODS
         from_browser = "cookie" in headers or is_socket
         if changes and origin is None and from_browser and "authorization" not in headers:
-            raise RefusedError(HTTPStatus.FORBIDDEN, "the request has no Origin header; a browser sends one")
+            raise RefusedError(
+                HTTPStatus.FORBIDDEN, "the request has a cookie but no Origin header; send a token instead"
+            )
         navigates = headers.get("sec-fetch-mode") == "navigate"
         if headers.get("sec-fetch-site") in {"cross-site", "same-site"} and not navigates:
             raise RefusedError(HTTPStatus.FORBIDDEN, _OTHER_SITE)

@@ -239,7 +239,7 @@ def _ends(estimate: Estimate) -> dict[str, float]:
 
 
 def sample_size_sentences(comparison: Comparison) -> list[str]:
-    """Say how many completions or prompts would detect the difference. Return nothing for missions."""
+    """Return sentences on how many completions would detect this difference; none for missions."""
     sizes = comparison.sample_sizes
     if comparison.counts_missions:
         return []

@@ -132,8 +132,8 @@ def resample(
 ) -> None:
     """Compute how often programs would pass with rejection sampling.
 
-    The programs of a judged run are checked, also against its house rules. The result is computed for each
-    maximum number of retries, without querying a model.
+    With rejection sampling, a model is asked again if the check rejects its program. The rate is computed
+    from a judged run's completions, for each maximum number of retries; no model is asked.
     """
     from roboeval.analysis.comparisons.compare import has_missions
     from roboeval.analysis.resample import LIMITS, count_by_prompt, curve_data

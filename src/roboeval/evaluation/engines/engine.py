@@ -27,9 +27,9 @@ class Engine(Protocol):
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
-        """Run each distinct program once, apply `then` to each result, and yield the values in input order.
+        """Run each distinct program once, and yield `then(result)` for each work, in order.
 
-        `function` and its results must be picklable. `then` runs in the main thread of a process if possible.
+        `function` runs the programs in other processes, so it and its results must be picklable.
         """
         ...
 

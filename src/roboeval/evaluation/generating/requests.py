@@ -57,7 +57,7 @@ class GenerationPlan:
         return prompt_for(self.instruction(key), rules=rules, skills=skills)
 
     def sample(self, key: CompletionKey) -> int:
-        """Return the number of a completion's sample. The random seed of the request depends on it."""
+        """Return the number, from 0, that makes the random seed of a completion's request differ."""
         return key[2]
 
     def copied_completions(self) -> Iterable[Completion]:
@@ -111,7 +111,7 @@ class RoundPlan(GenerationPlan):
         return first.after(program, self.problems[key]) if self.repairs and program.strip() else first
 
     def sample(self, key: CompletionKey) -> int:
-        """Return the number of a completion's sample. It differs between rounds, as do the random seeds."""
+        """Return the number that makes the random seed differ between completions and between rounds."""
         return key[2] + self.number * SAMPLE_STRIDE
 
     def copied_completions(self) -> Iterator[Completion]:
@@ -119,7 +119,7 @@ class RoundPlan(GenerationPlan):
         return (one for key, one in self.earlier.items() if key not in self.problems)
 
     def folder(self, run: RunFolder) -> RunFolder:
-        """Return the run of this round, a subfolder of the first run."""
+        """Return the folder of this round, such as `retry-2`. `run` is the folder of round 0."""
         return RunFolder(run.path / f"{'repair' if self.repairs else 'retry'}-{self.number}")
 
 

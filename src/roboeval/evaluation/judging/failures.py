@@ -85,12 +85,12 @@ FAILURE_CLASSES: Mapping[str, FailureClass] = {
 
 
 def label_of(name: str) -> str:
-    """Return the label of a failure class, such as `failed check`, or `name` itself for an unknown class."""
+    """Return the label of a failure class, such as `failed check`; an unknown `name` unchanged."""
     return FAILURE_CLASSES[name].label if name in FAILURE_CLASSES else name
 
 
 def plural_of(name: str) -> str:
-    """Return the plural label, such as `failed checks`, or `name` itself for an unknown class."""
+    """Return the plural label of a failure class, such as `failed checks`; an unknown `name` unchanged."""
     return FAILURE_CLASSES[name].plural if name in FAILURE_CLASSES else name
 
 

@@ -64,7 +64,7 @@ class RunFolder:
         return self.path / "checks" / f"{key}.json"
 
     def questions(self, key: str) -> Path:
-        """Return the folder in which `roboeval clarify` saves its results for an evaluation."""
+        """Return the folder of the results of `roboeval clarify` for the evaluation `key`, such as `plus`."""
         return self.path / "clarify" / key
 
     def judged_by(self) -> list[str]:

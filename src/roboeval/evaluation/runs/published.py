@@ -116,7 +116,9 @@ def _assigned(text: str, name: str) -> dict[str, str]:
     try:
         statements = parse(text).body
     except SyntaxError as error:
-        raise UserError(f"is not Python ({error.msg})", file=name, line=error.lineno) from None
+        raise UserError(
+            f"has a syntax error ({error.msg}); correct it", file=name, line=error.lineno
+        ) from None
     except (ValueError, RecursionError, MemoryError):
         raise UserError("cannot be parsed as Python; write plain assignments", file=name) from None
     texts = {

@@ -78,7 +78,7 @@ def ignore_the_answer(program: ProgramTree, _: Context) -> Edits:
 
 
 def assume_the_answer(program: ProgramTree, _: Context) -> Edits:
-    """Assumes a fixed answer without asking."""
+    """Replaces a question by a fixed answer, without asking."""
     return ({call: answer} for call, answer in _used(program))
 
 

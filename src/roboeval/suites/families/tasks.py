@@ -204,8 +204,8 @@ def _choose(form: FamilyFile, file: YamlFile, random: Random) -> Iterator[tuple[
         elif match := NUMBER_RANGE.fullmatch(choice):
             least, most = int(match[1]), int(match[2])
             if not least <= most < len(NUMBER_WORDS):
-                mend = "write ascending numbers up to 10, such as 2 to 4"
-                raise file.wrong(f"the range is not valid; {mend}", "choose", name)
+                mend = f"write ascending numbers up to {len(NUMBER_WORDS) - 1}, such as 2 to 4"
+                raise file.wrong(f'the range "{choice}" is not valid; {mend}', "choose", name)
             number = random.randint(least, most)
             yield from ((name, str(number)), (f"{name}_word", NUMBER_WORDS[number]))
         elif match := SEVERAL_WORDS.fullmatch(choice):

@@ -133,7 +133,11 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     kind, name = named[0]
     for other in {*MESSAGE_KEYS.values()} - {MESSAGE_KEYS[kind]}:
         if getattr(form, other):
-            raise file.wrong(f'for {kind}s, use "{MESSAGE_KEYS[kind]}" instead', *at, other)
+            raise file.wrong(
+                f'this skill has "{kind}", so name the fields of its message in "{MESSAGE_KEYS[kind]}"',
+                *at,
+                other,
+            )
     if skill.returns.annotation != "None" and not form.result:
         raise file.wrong(f'add "result", the field of the answer that {skill.signature} returns', *at)
     request = getattr(form, MESSAGE_KEYS[kind])

@@ -64,7 +64,7 @@ class Ros2Server(Server):
         return time.monotonic() if self.client.server_is_ready() else 0.0
 
     def is_connected(self, _silence: float) -> bool:
-        """Return whether the server is on the graph."""
+        """Return whether the action server is on the ROS graph."""
         return bool(self.client.server_is_ready())
 
     def has_pictures(self) -> bool:
