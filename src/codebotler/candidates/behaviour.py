@@ -11,7 +11,7 @@ from itertools import groupby
 from typing import NamedTuple, TypeAlias
 
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
-from codebotler.core.trace import Event, Outcome, Status, Trace
+from codebotler.core.trace import Outcome, Status, Trace
 from codebotler.rtl.text.clauses import clauses, complete_clauses, sentences
 from codebotler.rtl.text.numbers import numerals
 from codebotler.rtl.text.polarity import Polarity, polarity, without_harmless
@@ -96,7 +96,7 @@ def behaviour_of(
 
 def statements(trace: Trace) -> Iterator[tuple[str, str]]:
     """Yield the room and the text of each statement. All that is said before a drive is one statement."""
-    spoken = (one for one in trace if one.kind in {GOTO, SAY} and not _stays(one))
+    spoken = (one for one in trace if one.kind == SAY or (one.kind == GOTO and one.destination != one.place))
     for is_drive, some in groupby(spoken, key=lambda one: one.kind == GOTO):
         if not is_drive:
             said = [*some]
@@ -224,10 +224,6 @@ def _is_name(text: str) -> bool:
 
 def _plain(text: str) -> str:
     return " ".join(text.casefold().split())
-
-
-def _stays(event: Event) -> bool:
-    return event.kind == GOTO and event.destination == event.place
 
 
 def _last_room(trace: Trace, start: str) -> str:

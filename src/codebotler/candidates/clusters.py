@@ -203,12 +203,9 @@ def shared_rooms(programs: Iterable[str], maps: Sequence[RoomMap], settings: Che
     rooms = [room for room in named if not any(contains(other, room) for other in named if other != room)]
     if any(read_rooms(program, settings.skills)[1] for program in programs):
         kinds = Counter(ROOM_NUMBER.sub("", room) for room in rooms)
-        rooms += [_second_room(kind, rooms) for kind, count in kinds.items() if count == 1]
+        second = {kind: f"{kind} 1" if f"{kind} 2" in rooms else f"{kind} 2" for kind in kinds}
+        rooms += [second[kind] for kind, count in kinds.items() if count == 1]
     return replace(maps[0], rooms=(*rooms, start), start=start)
-
-
-def _second_room(kind: str, rooms: Sequence[str]) -> str:
-    return next(name for name in (f"{kind} 2", f"{kind} 1") if name not in rooms)
 
 
 def run_in_shared_worlds(

@@ -119,9 +119,7 @@ def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[st
     for name, now in evaluation_metadata(suite, ablated=ablated, tasks=None).items():
         if was.get(name) != now and name != "tasks":
             change = f'"{name}" was {_brief(was.get(name))} and is now {_brief(now)}'
-            raise UserError(
-                f"was judged differently: {change}; --redo starts over", file=path
-            )
+            raise UserError(f"was judged differently: {change}; --redo starts over", file=path)
     return was
 
 
