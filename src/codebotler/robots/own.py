@@ -7,7 +7,6 @@ import inspect
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import CancelledError as FutureCancelledError
-from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
 from traceback import extract_tb
@@ -78,7 +77,7 @@ class OwnRobot:
         self._stop_returned.set()
         self.failed_stop = ""
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._running: Future[Any] | None = None
+        self._running: asyncio.Task[Any] | None = None  # a method that cancelling ends
 
     def _method(self, skill: str) -> Callable[..., Any] | None:
         """Return the method for a skill, or None. If there is no `get_all_rooms`, use `rooms` instead."""
@@ -158,10 +157,11 @@ class OwnRobot:
                 self._stop_returned.clear()
                 threading.Thread(target=self._call_stop, daemon=True).start()
         self.clock.stop()
-        self._cancel_running()
+        cancelled = self._cancel_running()
         if not self._stop_returned.wait(STOP_SECONDS):
             self.failed_stop = f"{self.name}.stop failed: it took too long; {STOP_BY_HAND}"
-        self._cancel_running()  # it may have begun just before
+        if self._running is not cancelled:  # it may have begun just before
+            self._cancel_running()
 
     def _call_stop(self) -> None:
         try:
@@ -174,9 +174,11 @@ class OwnRobot:
         finally:
             self._stop_returned.set()
 
-    def _cancel_running(self) -> None:
-        if (running := self._running) is not None:
-            running.cancel()
+    def _cancel_running(self) -> asyncio.Task[Any] | None:
+        running, loop = self._running, self._loop
+        if running is not None and loop is not None:  # the method counts as running until it has cleaned up
+            loop.call_soon_threadsafe(running.cancel)
+        return running
 
     def disconnect(self) -> None:
         """Stop a running method, call the object's `disconnect` if it has one, and end the event loop."""
@@ -199,9 +201,13 @@ class OwnRobot:
         if not inspect.iscoroutine(result):
             return result
         assert self._loop is not None, "the robot is not connected"
-        future = asyncio.run_coroutine_threadsafe(result, self._loop)
-        if patience is None:
-            self._running = future
+
+        async def run() -> Any:  # noqa: ANN401 - as above
+            if patience is None:
+                self._running = asyncio.current_task()
+            return await result
+
+        future = asyncio.run_coroutine_threadsafe(run(), self._loop)
         try:
             return future.result(patience)
         except FutureCancelledError:
@@ -231,6 +237,12 @@ def _expect_fit(kind: str, method: Callable[..., Any], skill: Skill) -> None:
 def _run(loop: asyncio.AbstractEventLoop) -> None:
     try:
         loop.run_forever()
+        left = asyncio.all_tasks(loop)
+        for task in left:
+            if not task.cancelling():  # else it is cleaning up
+                task.cancel()
+        if left:
+            loop.run_until_complete(asyncio.wait(left, timeout=STOP_SECONDS))
         loop.run_until_complete(loop.shutdown_asyncgens())
     finally:
         loop.close()

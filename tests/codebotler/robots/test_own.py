@@ -234,6 +234,29 @@ def test_a_running_async_method_ends_before_stop_has_returned(write: Write) -> N
     assert robot._body.brakes < 10  # type: ignore[attr-defined]  # of a class in a file
 
 
+@pytest.mark.parametrize("leaves", [False, True], ids=["stop", "disconnect"])
+def test_a_cancelled_method_counts_as_running_until_it_has_cleaned_up(write: Write, *, leaves: bool) -> None:
+    robot = write(
+        """
+    began, folded = threading.Event(), False
+    def rooms(self): return ["hall"]
+    def stop(self): pass
+    async def go_to(self, location):
+        try: self.began.set(); await asyncio.sleep(30)
+        finally: await asyncio.sleep(0.05); self.folded = True
+"""
+    )
+    robot.connect()
+    body = robot._body  # type: ignore[attr-defined]  # of a class in a file
+    with ThreadPoolExecutor() as threads:
+        drive = threads.submit(robot.perform, "go_to", ["hall"])
+        assert body.began.wait(SOON)
+        (robot.disconnect if leaves else robot.cancel)()
+        with pytest.raises(CancelledError):
+            drive.result(SOON)
+        assert body.folded
+
+
 def test_stop_that_blocks_is_not_awaited_for_long(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(own, "STOP_SECONDS", 0.1)
     robot = write(
