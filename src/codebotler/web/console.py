@@ -264,6 +264,10 @@ class Console:
         """Whether a person must approve the next mission, since STOP was pressed or the robot was lost."""
         return self._hold.exists
 
+    def hold(self) -> None:
+        """Have a person approve the next mission."""
+        self._hold.write()
+
     def _end_hold(self) -> None:
         """End the hold after a person's STOP if a person has approved the mission that began after it."""
         session = self.session

@@ -75,6 +75,7 @@ def router(console: Console, face: Face) -> APIRouter:
     @routes.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
         """Stop a mission that is approved or runs, and return whether there was one to stop."""
+        console.hold()  # also between two missions of an agent, when the robot stands still for a moment
         stopping = console.stop(BY_FACE, only_moving=True, holds=True)
         return {"stopping": stopping, "warning": bool(console.warning or console.used_elsewhere)}
 

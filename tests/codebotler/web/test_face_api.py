@@ -179,11 +179,21 @@ def test_a_face_stops_a_robot_that_runs_and_nothing_else(server: PageServer) -> 
     server.call("POST", "/api/missions", {"program": FAR})
     while server.call("GET", "/api/robot").data["state"] != "checked":
         time.sleep(0.01)
+    before = held_at(server)
     assert server.face("POST", "/api/face/stop?only_moving=false").data == {
         "stopping": False,
         "warning": False,
     }
     assert server.call("GET", "/api/robot").data["state"] == "checked"
+    until = time.monotonic() + 10
+    while held_at(server) == before:
+        assert time.monotonic() < until, "agents do not wait for a person"
+        time.sleep(0.01)
+
+
+def held_at(server: PageServer) -> int:
+    """Return the time of the last press that holds agents, in nanoseconds, or 0."""
+    return max((file.stat().st_mtime_ns for file in (server.home / "robots").glob("*.held")), default=0)
 
 
 @pytest.mark.parametrize(
