@@ -22,11 +22,12 @@ from codebotler.missions.stop import StopButton
 from codebotler.robots import base
 from codebotler.robots.base import CameraPicture, CancelledError, RobotLostError
 from codebotler.simulator.guard.contract import has_place, is_goal
-from codebotler.simulator.guard.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, RuleViolationError
+from codebotler.simulator.guard.house_rule import RuleViolationError
 from codebotler.simulator.guard.rule_guard import RuleGuard, name_of
 from codebotler.simulator.settings import LIVE_LIMITS, SimulationSettings
 from codebotler.simulator.worlds.robot import Argument, Result
-from codebotler.simulator.worlds.room_map import RoomMap
+from codebotler.simulator.worlds.room_map import NO_ROOMS, RoomMap
+from codebotler.simulator.worlds.simulated_world import unknown_room
 
 MIN_LOGGED_SECONDS = 0.1
 """Shorter pauses are not logged, since a program may make thousands of them per second."""
@@ -148,11 +149,20 @@ class LiveRobot:
         return result if chosen is None else chosen
 
     def _listed(self, goal: Argument) -> Argument:
-        """Return the only listed room that a robot with its own planner may mean by a goal, or the goal."""
+        """Return the listed room that a goal means on a robot with its own planner, or a goal as it is.
+
+        Raise RobotError if it names several listed rooms, or one only as a part, such as "lab 1" in "lab 12",
+        since this robot might drive to any of them, or to a room that nobody has approved.
+        """
         if not isinstance(goal, str):
             return goal
-        rooms = self._room_map.possible_rooms(goal) if self._room_map and self._room_map.plain else []
-        return rooms[0] if len(rooms) == 1 else goal.strip()
+        known = self._room_map if self._room_map and self._room_map.plain else NO_ROOMS
+        room, possible = known.room(goal), known.possible_rooms(goal)
+        if room is None and possible:
+            error = unknown_room(goal.strip(), possible)
+            self._write_event("log", text=f"not sent to the robot: {error}")
+            raise error
+        return room or goal.strip()
 
     # --- rules
 
@@ -180,7 +190,7 @@ class LiveRobot:
             self._room = self._ask_room()
         if rules and self._room is None:
             with self._enforcing():
-                guard.give_up(rules, event, "cannot judge", UNKNOWN_ROOM)
+                guard.give_up(rules, event)
         room = self._room or ""
         texts = dict.fromkeys([event.text, *(self._rooms_meant(event.text) if is_drive else ())])
         with self._enforcing():
@@ -201,26 +211,12 @@ class LiveRobot:
             return
         seen = replace(event, place=room)
         if is_drive:
-            seen = self._resolve_drive(guard, seen, failed=failed)
+            goals = self._rooms_meant(event.text)
+            seen = replace(seen, text=goals[0] if len(goals) == 1 else event.text)
+            is_known = not failed and (len(goals) == 1 or self._room_map is None)
+            self._room, self._has_asked = (seen.text if is_known else None), False
         with self._enforcing():
             guard.judge_result(seen)
-
-    def _resolve_drive(self, guard: RuleGuard, event: Event, *, failed: bool) -> Event:
-        """Return a drive with the name of its destination. If a rule depends on the name, ask the robot."""
-        goals = self._rooms_meant(event.text)
-        possible = [replace(event, text=goal) for goal in goals or [event.text]]
-        is_known = not failed and (len(goals) == 1 or self._room_map is None)
-        self._room, self._has_asked = (possible[0].text if is_known else None), False
-        rules = [rule for rule in guard.rules if rule.tells_apart(possible)]
-        if not rules:
-            return possible[0]
-        if not failed:  # after a failed drive, the robot's room does not reveal the destination
-            self._room = self._ask_room()
-        if self._room is not None:
-            return replace(event, text=self._room)
-        with self._enforcing():
-            guard.give_up(rules, event, "could not judge", AMBIGUOUS_GOAL)
-        return possible[0]
 
     def _on_pose(self, at: Point | None) -> None:
         """Report a move to the guard as a straight line. A position of None means that poses are missing."""

@@ -69,6 +69,22 @@ def run(
 
 
 @pytest.mark.parametrize(
+    "goal",
+    [
+        "the stairs between kitchen and café",
+        "kitchenette",
+        "my kitchen2",
+    ],
+)
+def test_goal_that_is_not_one_listed_room_does_not_reach_the_robot(tmp_path: Path, goal: str) -> None:
+    robot = FakeRobot()
+    program = f"def task_program():\n    try: go_to({goal!r})\n    except Exception: go_to('kitchen')\n"
+    mission, lines = run(tmp_path, robot, program)
+    assert (mission.state, robot.done) == (MissionState.DONE, ["kitchen"])
+    assert [goal in line["text"] for line in lines if line["event"] == "log"] == [True]
+
+
+@pytest.mark.parametrize(
     "call",
     [
         "go_to('the vault')",

@@ -22,7 +22,7 @@ from codebotler.robots.base import Robot, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.rtl import parse
-from codebotler.simulator.guard.house_rule import AMBIGUOUS_GOAL, UNKNOWN_ROOM, Rule
+from codebotler.simulator.guard.house_rule import UNKNOWN_ROOM, Rule
 from codebotler.simulator.worlds.room_map import RoomMap
 from doubles import FakeRobot
 
@@ -138,8 +138,8 @@ def test_a_rule_of_the_end_is_reported_and_changes_nothing(tmp_path: Path, said:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("request_", ["vault", "THE VAULT", "kitchen, not the vault"])
-def test_every_room_that_a_request_may_mean_counts(tmp_path: Path, request_: str) -> None:
+@pytest.mark.parametrize("request_", ["vault", "THE VAULT", "not the vault"])
+def test_the_room_that_a_request_means_counts(tmp_path: Path, request_: str) -> None:
     robot = robot_with()
     rule = Rule("vault", VAULT.says, parse('not tr.Exists(goto("^the vault$"))'))
     rooms = [rule] if "the vault" in request_.lower() else [VAULT]
@@ -173,11 +173,11 @@ def require_room(room: str | None) -> str:
     ("where", "state"),
     [(None, MissionState.STOPPED), ("lab", MissionState.DONE), ("lab 2", MissionState.STOPPED)],
 )
-def test_every_possible_goal_counts_unless_the_robot_reports_its_room(
+def test_robot_reports_its_room_after_a_drive_to_an_unlisted_one(
     tmp_path: Path, where: str | None, state: MissionState
 ) -> None:
     robot = robot_with(lambda skill, _: require_room(where) if skill == "get_current_location" else None)
-    program = "def task_program():\n    go_to('the lab 2, at the window')\n    say('hello')\n"
+    program = "def task_program():\n    go_to('where the computers are')\n    say('hello')\n"
     mission, _ = run(tmp_path, robot, program, [IN_LAB_2], LABS)
     assert mission.state is state
 
@@ -185,14 +185,14 @@ def test_every_possible_goal_counts_unless_the_robot_reports_its_room(
 AFTER_LAB = Rule(
     "after", "Be silent after lab 2.", parse('not tr.OnlyAfterFirst(goto("^lab 2$")).Exists(say("."))')
 )
-THREE = "def task_program():\n    go_to('the lab 2, at the window')\n    say('one')\n    say('two')\n"
+THREE = "def task_program():\n    go_to('where the computers are')\n    say('one')\n    say('two')\n"
 
 
 @pytest.mark.parametrize(
     ("rule", "asked"),
     [
         (IN_LAB_2, 1),
-        (AFTER_LAB, 1),
+        (AFTER_LAB, 0),
         (VAULT, 0),
         (Rule("drives", "Drive little.", parse('not tr.AtLeast(goto("lab"), 3)')), 0),
     ],
@@ -235,22 +235,6 @@ def test_mission_stops_and_says_why_if_the_room_is_unknown(tmp_path: Path, *, re
 
 
 CAUGHT = "try: say('one')\n    except BaseException: pass"
-
-
-@pytest.mark.parametrize("fails", [False, True], ids=["arrives", "fails"])
-def test_mission_stops_after_a_drive_if_its_goal_is_ambiguous(tmp_path: Path, *, fails: bool) -> None:
-    def answer(skill: str, _: str) -> RobotResult:
-        if fails and skill == "go_to":
-            raise RobotError("GoToInvalidLocation", "the door is shut")
-        return require_room("hall" if fails else None) if skill == "get_current_location" else None
-
-    robot = robot_with(answer)
-    mission, lines = run(tmp_path, robot, THREE, [AFTER_LAB], LABS)
-    assert mission.state is MissionState.STOPPED
-    assert robot.cancels
-    assert [line["event"] for line in lines].count("skill") == 1
-    (line,) = [line for line in lines if line["event"] == "rule"]
-    assert (line["rule"], line["prevented"], line["why"]) == ("after", False, AMBIGUOUS_GOAL)
 
 
 def test_failed_drive_to_one_room_needs_no_question(tmp_path: Path) -> None:
@@ -302,25 +286,11 @@ def test_robot_that_lists_no_rooms_is_judged_by_the_words_of_drives(tmp_path: Pa
 
 @pytest.mark.slow
 def test_room_that_the_robot_reports_counts_even_if_not_requested(tmp_path: Path) -> None:
-    for request_, where in (("the lab, by the hall", "Lab 2 "), ("where the computers are", "lab 2")):
+    for request_, where in (("by the stairs", "Lab 2 "), ("where the computers are", "lab 2")):
         robot = robot_with(lambda skill, _: where if skill == "get_current_location" else None)  # noqa: B023 - called in this round
         program = f"def task_program():\n    go_to({request_!r})\n    say('hello')\n"
         mission, _ = run(tmp_path / where.strip(), robot, program, [IN_LAB_2], LABS)
         assert mission.state is MissionState.STOPPED, request_
-
-
-def test_room_after_a_failed_drive_does_not_reveal_its_goal(tmp_path: Path) -> None:
-    def answer(skill: str, _: str) -> RobotResult:
-        if skill == "go_to":
-            raise RobotError("GoToInvalidLocation", "the door is shut")
-        return "hall" if skill == "get_current_location" else None
-
-    tried = Rule(
-        "tried", "Be silent after that.", parse('not tr.OnlyAfterFirst(goto("lab")).Exists(say("."))')
-    )
-    program = "def task_program():\n    try: go_to('hall by the lab')\n    except Exception: say('hello')\n"
-    mission, _ = run(tmp_path, robot_with(answer), program, [tried], LABS)
-    assert mission.state is MissionState.STOPPED
 
 
 def test_failed_drive_counts_in_its_starting_room(tmp_path: Path) -> None:
@@ -498,14 +468,14 @@ def test_robot_receives_the_words_that_were_judged(tmp_path: Path, request_: str
     [
         ("the stairs behind the kitchen", "kitchen"),
         ("Kitchen", "kitchen"),
-        ("kitchen, hall", "kitchen, hall"),
+        ("the kitchen 2, at the window", "kitchen 2"),
         (" cellar ", "cellar"),
     ],
 )
-def test_a_robot_with_its_own_planner_is_sent_the_only_listed_room(
+def test_a_robot_with_its_own_planner_is_sent_the_listed_room(
     tmp_path: Path, request_: str, received: str
 ) -> None:
-    rooms, robot = RoomMap(("hall", "kitchen"), "hall", plain=True), robot_in("hall")
+    rooms, robot = RoomMap(("hall", "kitchen", "kitchen 2"), "hall", plain=True), robot_in("hall")
     rule = Rule("acme", "Stay out.", parse('not tr.Exists(goto("acme"))'))
     run(tmp_path, robot, f"def task_program():\n    go_to({request_!r})\n", [rule], rooms)
     assert robot.done[0] == received

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
@@ -13,15 +13,13 @@ from codebotler.core.text.phrases import phrase
 from codebotler.core.trace import Event
 from codebotler.rtl import EventPattern, Formula, Regex
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.rtl.semantics import is_match
 
-Objection: TypeAlias = Literal["forbids", "cannot judge", "is broken by", "could not judge"]
+Objection: TypeAlias = Literal["forbids", "cannot judge", "is broken by"]
 WhenJudged: TypeAlias = Literal["always", "leaving", "finally"]
 
 # Reasons why a rule cannot be judged, each the end of a sentence.
 NON_TEXT_OPTION = "which offers an option that is not text"
 UNKNOWN_ROOM = "since the robot does not say which room it is in"
-AMBIGUOUS_GOAL = "since it could mean several rooms, and the robot does not say which"
 
 
 @dataclass(frozen=True)
@@ -73,11 +71,6 @@ class Rule:
             return [replace(attempt, answer=option.text) for option in attempt.options]
         return (attempt,)
 
-    def tells_apart(self, events: Iterable[Event]) -> bool:
-        """Return whether some pattern of the rule matches some of these events but not all."""
-        events = tuple(events)
-        return any(len({is_match(one, event, 0) for event in events}) > 1 for one in self.elements)
-
 
 class RuleViolationError(RobotError):
     """A rule would be broken, has been broken or cannot be judged.
@@ -103,7 +96,7 @@ class RuleViolationError(RobotError):
     @property
     def is_late(self) -> bool:
         """Whether the event has already happened, so that the guard could not prevent it."""
-        return self.objection in {"is broken by", "could not judge"}
+        return self.objection == "is broken by"
 
     @property
     def ends_run(self) -> bool:

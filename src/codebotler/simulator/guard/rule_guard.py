@@ -18,7 +18,7 @@ from codebotler.core.trace import Event, attempted_event
 from codebotler.core.world import Point, rooms_along
 from codebotler.rtl import Inconclusive, Monitor
 from codebotler.simulator.guard.contract import Contract, RequestedCall, contract_violation, is_goal
-from codebotler.simulator.guard.house_rule import NON_TEXT_OPTION, Objection, Rule, RuleViolationError
+from codebotler.simulator.guard.house_rule import NON_TEXT_OPTION, UNKNOWN_ROOM, Rule, RuleViolationError
 from codebotler.simulator.worlds.entities import Thing
 from codebotler.simulator.worlds.robot import Argument, Result, SimulatedRobot
 from codebotler.simulator.worlds.room_map import NO_ROOMS, RoomMap
@@ -231,12 +231,15 @@ class RuleGuard:
             for event in self._entered(rooms_along(self._rooms, start, end), holding):
                 self.judge_result(event)
 
-    def give_up(self, rules: Iterable[Rule], event: Event, objection: Objection, why: str) -> None:
-        """Stop judging some rules. Raise RuleViolationError for the first of them that must always hold."""
+    def give_up(self, rules: Iterable[Rule], event: Event) -> None:
+        """Stop judging some rules, since the robot's room is unknown.
+
+        Raise RuleViolationError for the first of them that must always hold.
+        """
         for rule in rules:
             self._history.unjudged.add(rule.name)
             if rule.when == "always":
-                raise RuleViolationError(rule, event, objection, why)
+                raise RuleViolationError(rule, event, "cannot judge", UNKNOWN_ROOM)
 
     def find_first_unkept(self) -> RuleViolationError | None:
         """Return an error for the first rule that is broken if the mission ends now, or None."""
