@@ -74,6 +74,8 @@ def behaviour_of(
     """
     trace = outcome.trace
     is_done = outcome.status is Status.FINISHED
+    error = outcome.status.value if outcome.error is None else outcome.error.kind
+    rooms = [one.destination for one in trace if one.kind == GOTO and one.destination is not None]
     return Behaviour(
         said=frozenset((room, claims_of(text, names)) for room, text in statements(trace)),
         moved=tuple(
@@ -89,8 +91,8 @@ def behaviour_of(
             if one.kind == ASK
         ),
         done=tuple(sorted((one.kind, one.text, *one.more) for one in trace if one.kind not in PAPER_KINDS)),
-        ending="" if is_done else ENDLESS_RUN if outcome.status is Status.TIMEOUT else _error_kind(outcome),
-        room=_last_room(trace, start) if is_done else "",
+        ending="" if is_done else ENDLESS_RUN if outcome.status is Status.TIMEOUT else error,
+        room=[start, *rooms][-1] if is_done else "",
     )
 
 
@@ -224,12 +226,3 @@ def _is_name(text: str) -> bool:
 
 def _plain(text: str) -> str:
     return " ".join(text.casefold().split())
-
-
-def _last_room(trace: Trace, start: str) -> str:
-    rooms = (one.destination for one in reversed(trace) if one.kind == GOTO and one.destination is not None)
-    return next(rooms, start)
-
-
-def _error_kind(outcome: Outcome) -> str:
-    return outcome.error.kind if outcome.error is not None else outcome.status.value

@@ -27,6 +27,7 @@ from codebotler.checking.sampled import (
 )
 from codebotler.checking.source.static import read_rooms
 from codebotler.core.errors import UserError
+from codebotler.core.terminal import shortened
 from codebotler.core.text.words import counted
 from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.worker import Worker
@@ -78,13 +79,13 @@ class CandidateClusters:
 
     Args:
         clusters: at least one. If the check rejects all candidates, the only cluster has the first of them.
-        rejected: the number of rejected candidates that are not in a cluster.
+        rejected: for each rejected candidate that is not in a cluster, the first problem.
         unwanted: the number of accepted candidates that behave like a refused program.
         people: the names of the people on the map, from `normalized`.
     """
 
     clusters: tuple[CandidateCluster, ...]
-    rejected: int = 0
+    rejected: tuple[str, ...] = ()
     unwanted: int = 0
     people: frozenset[str] = frozenset()
 
@@ -98,9 +99,11 @@ class CandidateClusters:
         """A phrase about the choice of a cluster: "took the most frequent behaviour: 3 of 4 programs"."""
         largest, total = self.clusters[0], counted(self.total, "program")
         if not largest.samples:
-            every = counted(self.total + self.rejected, "program")
+            every = counted(self.total + len(self.rejected), "program")
             return f"the check rejected all of {every}; took the first"
-        rejected = f"; the check rejected {self.rejected}" if self.rejected else ""
+        rejected = f"; the check rejected {len(self.rejected)}{main_reason(self.rejected)}" * bool(
+            self.rejected
+        )
         rejected += f"; {self.unwanted} would do what was not meant" if self.unwanted else ""
         if self.unwanted and len(self.clusters) == 1:
             return f"took the only behaviour that was not refused: {largest.size} of {total}{rejected}"
@@ -109,6 +112,13 @@ class CandidateClusters:
         if any(other.size == largest.size for other in self.clusters[1:]):
             return f"took the first of the most frequent behaviours: {largest.size} of {total}{rejected}"
         return f"took the most frequent behaviour: {largest.size} of {total}{rejected}"
+
+
+def main_reason(rejected: Sequence[str]) -> str:
+    """Return the most frequent of some problems: ` (2 of them: there is no lab)`; empty if there are none."""
+    for problem, count in Counter(rejected).most_common(1):
+        return f" ({f'{count} of them: ' * (len(rejected) > 1)}{shortened(problem)})"
+    return ""
 
 
 def cluster_candidates(
@@ -133,8 +143,11 @@ def cluster_candidates(
     counts = Counter(programs)
     checks = {program: check_on(worker, program, room_map, settings) for program in counts}
     accepted = [program for program, found in checks.items() if not found.problems]
+    rejected = tuple(
+        found.problems[0].message for found in map(checks.__getitem__, programs) if found.problems
+    )
     if not accepted:
-        return CandidateClusters((CandidateCluster((programs[0],), 1, (), ()),), len(programs) - 1)
+        return CandidateClusters((CandidateCluster((programs[0],), 1, (), ()),), rejected[1:])
     rooms = room_map or shared_rooms(accepted, [checks[one].room_map for one in accepted], settings)
     runs = run_in_shared_worlds(worker, [*accepted, *refused], rooms, settings)
     traces = [sample.outcome.trace for samples in runs for sample in samples]
@@ -145,13 +158,12 @@ def cluster_candidates(
 
     behaviours = [*map(describe, runs)]
     texts = [[wording(sample.outcome.trace) for sample in samples] for samples in runs]
-    rejected = len(programs) - sum(counts[one] for one in accepted)
     together: dict[tuple[Behaviour, ...], list[int]] = {}
     # A person may have meant other words only, so if nothing else differs, the words count.
     for number in _wanted(behaviours, len(accepted)) or _wanted(texts, len(accepted)):
         together.setdefault(behaviours[number], []).append(number)
     if not together:
-        again = counted(len(programs) - rejected, "program")
+        again = counted(len(programs) - len(rejected), "program")
         raise UserError(f"{again} would again do what was not meant; give the instruction in other words")
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     people = frozenset(map(normalized, rooms.people))
@@ -159,7 +171,7 @@ def cluster_candidates(
     if sum(conflicts) > len(conflicts) / 2:
         more = _run_with_settled_people(worker, clusters, rooms, settings)
         clusters = [one.extended(new, describe(new)) for one, new in zip(clusters, more, strict=True)]
-    unwanted_count = len(programs) - rejected - sum(one.size for one in clusters)
+    unwanted_count = len(programs) - len(rejected) - sum(one.size for one in clusters)
     clusters.sort(key=lambda one: (-one.size, one.in_vain))
     return CandidateClusters(tuple(clusters), rejected, unwanted_count, people)
 

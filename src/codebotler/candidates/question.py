@@ -8,7 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 from codebotler.candidates.behaviour import PAPER_KINDS, Behaviour, statements
-from codebotler.candidates.clusters import CandidateCluster, CandidateClusters, conflicts_in_worlds
+from codebotler.candidates.clusters import (
+    CandidateCluster,
+    CandidateClusters,
+    conflicts_in_worlds,
+    main_reason,
+)
 from codebotler.checking.problems import Sample
 from codebotler.checking.storyboard import steps_of
 from codebotler.core.errors import UserError
@@ -76,7 +81,7 @@ class ClarifyingQuestion:
         facts: the facts of the imagined world that explain the differences, in words.
         total: the number of accepted candidates.
         sample: the number of the imagined world.
-        rejected: the number of candidates that the check rejected.
+        rejected: for each candidate that the check rejected, the first problem.
         why_last: why no new programs are written after the answer `none`; empty if some are.
     """
 
@@ -84,7 +89,7 @@ class ClarifyingQuestion:
     facts: tuple[str, ...]
     total: int
     sample: int
-    rejected: int = 0
+    rejected: tuple[str, ...] = ()
     why_last: str = ""
 
     @property
@@ -92,7 +97,10 @@ class ClarifyingQuestion:
         """A sentence about missing candidates: "Not shown: 2 programs that ..."; empty if none is missing."""
         left = self.total - sum(one.size for one in self.options)
         parts = [f"{counted(left, 'program')} that would do something else"] if left else []
-        parts += [f"{counted(self.rejected, 'program')} that the check rejects"] if self.rejected else []
+        rejected = (
+            f"{counted(len(self.rejected), 'program')} that the check rejects{main_reason(self.rejected)}"
+        )
+        parts += [rejected] if self.rejected else []
         return f"Not shown: {listed(parts)}." if parts else ""
 
     @property
@@ -195,17 +203,18 @@ def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> lis
     return [*different.values()][:MAX_CANDIDATE_OPTIONS]
 
 
-def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, int, int, int, int, int]:
+def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, ...]:
     """Rank a world: by the number of options, their candidates, what a person cares about, and brevity.
 
-    Where an option does more, a person sees better what it is for: it finds what it looks for. The largest
-    cluster counts first.
+    Options that all act, but in different rooms, differ more than those that only say something else. Where
+    an option does more, a person sees better what it is for. The largest cluster counts first.
     """
     first, *others = (one.behaviours[number] for one in shown)
     cares = sum(bool(first.differences(other) & NOTICED_FIRST) for other in others)
     traces = [one.samples[number].outcome.trace for one in shown]
-    deeds = [sum(event.kind in NOTICED_KINDS for event in trace) for trace in traces]
-    return len(shown), sum(one.size for one in shown), cares, deeds[0], sum(deeds), -sum(map(len, traces))
+    acts = [[(event.kind, event.place) for event in trace if event.kind in NOTICED_KINDS] for trace in traces]
+    sizes, apart = sum(one.size for one in shown), all(acts) and sum({*one} != {*acts[0]} for one in acts)
+    return len(shown), sizes, cares, apart, len(acts[0]), sum(map(len, acts)), -sum(map(len, traces))
 
 
 def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[str, ...]:

@@ -95,7 +95,7 @@ def scenes_reached(strip: Strip, visited: Sequence[str], learned: Sequence[Event
     """Return how many drives of a strip the robot has done, or None if it did or saw something else."""
     known = [*takewhile(lambda scene: scene.room != _LEFT_OUT, strip.scenes)]
     expected = [deed.text for scene in known for deed in scene.deeds if deed.kind in {CHECK, ANSWER}]
-    actual = [_learned_text(event) for event in learned]
+    actual = [_phrase(one) if one.kind == CHECK else _answer_text(one.answer) for one in learned]
     if len(known) < len(strip.scenes):  # what was left out may contain the rest
         actual = actual[: len(expected)]
     # Speech recognition may change the case of an option and add spaces.
@@ -207,10 +207,6 @@ def _actions(step: Mapping[str, Any]) -> Sequence[Action]:
     if "answer" not in step:
         return (Action(kind, text, number, is_repeated),)
     return (Action(kind, text, number, is_repeated), Action(ANSWER, _answer_text(step["answer"])))
-
-
-def _learned_text(event: Event) -> str:
-    return _phrase(event) if event.kind == CHECK else _answer_text(event.answer)
 
 
 def _answer_text(answer: object) -> str:

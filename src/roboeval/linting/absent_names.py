@@ -39,8 +39,10 @@ def _names(requirement: Requirement, world: World, task: Task) -> Iterator[tuple
         category = row.recording.names if row is not None and row.recording is not None else ""
         is_own = row is not None and row.name not in SKILLS  # may take any description, such as "red fruit"
         if (known := known_names.get(category)) is not None:
-            found = (one for pattern in patterns(element.text) for one in _alternatives(pattern))
-            yield from ((category, one, known) for one in found if not (is_own and _is_asked_for(one, task)))
+            found = [one for pattern in patterns(element.text) for one in _alternatives(pattern)]
+            prompts = "\n".join(task.prompts) if is_own else ""
+            asked = [one for one in found if re.search(one, prompts, re.IGNORECASE)]
+            yield from ((category, one, known) for one in found if one not in asked)
         elif not category:
             yield from (("person", one, [*people, *_owners(rooms)]) for one in _mentioned(element, task))
         if element.holding is not None:
@@ -63,11 +65,6 @@ def _mentioned(element: EventPattern, task: Task) -> Iterator[str]:
     for name in sorted(_people(task)):
         if re.search(rf"\b{re.escape(name)}\b", plain):
             yield name
-
-
-def _is_asked_for(pattern: str, task: Task) -> bool:
-    """Return whether a prompt of the task contains words that a regex matches."""
-    return any(re.search(pattern, prompt, re.IGNORECASE) for prompt in task.prompts)
 
 
 def _people(task: Task) -> set[str]:

@@ -70,7 +70,7 @@ def sections(runs: Sequence[JudgedRun], *, with_published: bool = False, command
         question.question_section(runs),
         section("cost", cost.cost_sheet(runs), cost.budget_sheet(runs)),
         section("prompts", scores.prompt_sheet(runs), published_sheet(runs)),
-        origin_section(runs, command),
+        section("origin", origin_sheet(runs), Prose([*about_suite(runs), f"`{command}`"])),
     ]
     return [one for one in found if one.parts]
 
@@ -89,11 +89,6 @@ def glance_section(runs: Sequence[JudgedRun]) -> Section:
         for run in runs
     ]
     return section("glance", Cards(cards), Prose(scores.leader_sentences(runs)))
-
-
-def origin_section(runs: Sequence[JudgedRun], command: str) -> Section:
-    """Build the section on the runs, the suite, and the command that reproduces the report."""
-    return section("origin", origin_sheet(runs), Prose([*about_suite(runs), f"`{command}`"]))
 
 
 def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:

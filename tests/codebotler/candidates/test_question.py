@@ -66,10 +66,12 @@ def test_question_offers_at_most_the_three_largest_options() -> None:
     assert question.total == 10
     assert "1 program " in question.left_out
     assert not ask_about(cluster(2, "a", ONE), cluster(1, "b", TWO)).left_out
-    clusters = CandidateClusters((cluster(2, "a", ONE), cluster(1, "b", TWO)), rejected=2)
+    clusters = CandidateClusters(
+        (cluster(2, "a", ONE), cluster(1, "b", TWO)), rejected=("no lab", "no hall", "no lab")
+    )
     rest = question_about(clusters)
     assert rest is not None
-    assert "2 programs that the check rejects" in rest.left_out
+    assert "3 programs that the check rejects (2 of them: no lab)" in rest.left_out
 
 
 def test_an_option_that_waits_without_success_says_so() -> None:
@@ -91,6 +93,14 @@ def test_a_world_in_which_the_most_frequent_behaviour_does_something_is_preferre
 
 def test_a_world_in_which_all_options_do_something_is_preferred() -> None:
     assert ask_about(cluster(2, "a", ONE, ONE), cluster(1, "b", (), TWO)).sample == 1
+
+
+def test_a_world_in_which_options_act_in_different_rooms_is_preferred() -> None:
+    lab = (drive("hall", "lab"), say("hello", "lab"), drive("lab", "hall"))
+    idle = (drive("hall", "lab"), drive("lab", "hall"))
+    speaks = cluster(3, "speaks anyway", (*lab, say("2 told")), (*lab, say("2 told")))
+    looks = cluster(2, "looks first", (*lab, say("told 1 and 1")), (*idle, say("told 1")))
+    assert ask_about(speaks, looks).sample == 1
 
 
 def test_options_that_are_alike_in_the_world_are_told_apart_from_others() -> None:

@@ -34,7 +34,7 @@ def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, 
     if form == "ing" and answer is not None:
         return f"the answer {quote}{answer}{quote} to {quote}{show(event.text)}{quote}"
     given = [*map(show, (event.text, *event.more))]
-    is_bare = (not given[0] and by_event(event.kind) is None) or has_no_text(event.kind)
+    is_bare = (not given[0] and by_event(event.kind) is None) or not _recording(event.kind).text
     known = verb(event.kind)
     words = known.with_object(getattr(known, form), [] if is_bare else given, quote)
     if form in {"base", "ing"}:
@@ -64,11 +64,6 @@ def verb(kind: str) -> Verb:
         return row.verb
     shown = visible(kind)
     return Verb(f"do {shown}", f"does {shown}", f"did {shown}", f"doing {shown}", f"did {shown}")
-
-
-def has_no_text(kind: str) -> bool:
-    """Whether events of this kind have no text because their skill has no parameters."""
-    return not _recording(kind).text
 
 
 def is_spoken(kind: str) -> bool:

@@ -239,7 +239,7 @@ def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> N
     lacks = next((name for name in had if name not in here), None)
     if lacks is not None:
         where = f'ran on another map, with the room "{shortened(lacks)}"'
-        raise UserError(f"mission {mission} {where}; give the same --world again, or leave it out")
+        raise UserError(f"mission {mission} {where}; give its --world")
 
 
 def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[LoggedRobot, Event | None]:

@@ -92,7 +92,7 @@ def clarify_view(data: Mapping[str, Any], title: str, candidates: int) -> Render
     table.add_row("all", "", *_cells(data), style="bold")
     lines = [
         "pass@1 of one program, of the largest group with one behaviour, and of a simulated person's choice",
-        f"each figure is a mean over {DRAWS_PER_PROMPT} random draws of candidates; the check rejects some",
+        f"means over {DRAWS_PER_PROMPT} random draws of candidates; the check rejects some, even right ones",
         "asked: share of the draws in which the programs that are left differed enough for a question",
         "mattered: share of the questions whose answer led to another verdict than the largest group's",
     ]

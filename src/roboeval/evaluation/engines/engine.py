@@ -29,7 +29,7 @@ class Engine(Protocol):
     ) -> Iterator[WorkResult]:
         """Run each distinct program once, and yield `then(result)` for each work, in order.
 
-        `function` runs the programs in other processes, so it and its results must be picklable.
+        `function` and `then` may run in other processes, so they and their results must be picklable.
         """
         ...
 

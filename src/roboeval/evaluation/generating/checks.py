@@ -62,7 +62,7 @@ def check_programs(
 
 
 def _open_checks(run: RunFolder, key: str, metadata: dict[str, Any]) -> Appender:
-    rows, about = run.checks(key), run.checks_manifest(key)
+    rows, about = run.checks(key), run.checks(key).with_suffix(".json")
     about.parent.mkdir(exist_ok=True)
     if not about.exists() or load_json_object(about) != metadata:
         rows.unlink(missing_ok=True)

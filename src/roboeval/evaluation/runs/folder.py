@@ -59,10 +59,6 @@ class RunFolder:
         """Return the path of the file with the problems that the check found in each program."""
         return self.path / "checks" / f"{key}.jsonl"
 
-    def checks_manifest(self, key: str) -> Path:
-        """Return the path of the file that records the suite and settings of the check."""
-        return self.path / "checks" / f"{key}.json"
-
     def questions(self, key: str) -> Path:
         """Return the folder of the results of `roboeval clarify` for the evaluation `key`, such as `plus`."""
         return self.path / "clarify" / key
