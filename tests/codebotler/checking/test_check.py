@@ -16,6 +16,7 @@ from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.fact_sampler import FactSampler
 from codebotler.simulator.worlds.room_map import RoomMap
+from haste import hasten
 
 ROOMS = ("start_loc", "kitchen", "alice's office", "bob's office")
 START = "def task_program():\n    "
@@ -226,7 +227,10 @@ def test_endless_waiting_in_every_world_is_one_problem(checks: Checks) -> None:
 
 
 @pytest.mark.slow
-def test_endless_computation_does_not_count_as_waiting(checks: Checks) -> None:
+def test_endless_computation_does_not_count_as_waiting(
+    checks: Checks, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hasten(monkeypatch)
     found = checks("for room in get_all_rooms():", "    is_in_room(room)", "sum(range(10**12))", samples=2)
     assert [problem.kind for problem in found.problems] == ["TimeoutError"]
     assert len(found.samples) == 2

@@ -39,6 +39,7 @@ from codebotler.simulator.process.isolated_process import IsolatedProcess
 from codebotler.simulator.settings import SimulationSettings
 from codebotler.simulator.worker import Worker
 from codebotler.simulator.worlds.robot import SimulatedRobot
+from haste import hasten
 from roboeval.evaluation.judging.judge import judge
 from roboeval.suites.load import Requirement, Scenario
 
@@ -354,7 +355,11 @@ def honest(reach: Reach) -> Outcome:
     [pytest.param(path, marks=[pytest.mark.slow] * (path.stem not in ONE_A_LAYER)) for path in PROGRAMS],
     ids=lambda path: path.stem,
 )
-def test_hostile_program_gets_nothing(path: Path, reach: Reach, honest: Outcome) -> None:
+def test_hostile_program_gets_nothing(
+    path: Path, reach: Reach, honest: Outcome, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if path.stem.startswith("cpu"):
+        hasten(monkeypatch)
     source = reach.fill(path.read_text(encoding="utf-8"))
     wanted = read_expectation(source)
     before = reach.state()

@@ -224,7 +224,7 @@ DEEDS = {
     ),
     "MSGQUEUE": Deed("limit('MSGQUEUE')", A_QUEUE, "EMFILE", NOBODY),
     "AS": Deed("limit('AS')", "succeed(libc.mmap(None, 10**9, READABLE, PRIVATE, -1, 0))", "ENOMEM"),
-    "CPU": Deed("isolation.limit_time(1)", "while time.process_time() < 1.5: pass", "SIGXCPU"),
+    "CPU": Deed("isolation.limit_time(1)", "while time.process_time() < 1.1: pass", "SIGXCPU"),
     "death with the parent": Deed("isolation.die_with_parent()", OUTLIVE_PARENT, "", AN_ORPHAN),
     "hidden memory": Deed("isolation.prctl(isolation.PR_SET_DUMPABLE, 0)", LOOK, "EACCES", BECOME_VISIBLE),
 }

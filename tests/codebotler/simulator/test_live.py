@@ -132,11 +132,11 @@ def test_long_live_runs_have_no_limit_of_time(worker: Worker) -> None:
 
 @pytest.mark.slow
 def test_program_may_compute_for_long_between_skills(worker: Worker, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("codebotler.simulator.process.isolated_process.PROCESS_WAIT_SECONDS", 3.0)
+    monkeypatch.setattr("codebotler.simulator.process.isolated_process.PROCESS_WAIT_SECONDS", 1.0)
     program = (
         "def task_program():\n"
         "    for i in range(20):\n"
-        "        for _ in range(20): sum(range(1_200_000))\n"
+        "        for _ in range(7): sum(range(1_200_000))\n"
         "        say(str(i))\n"
     )
     assert run_live(worker, program)[0] == [str(number) for number in range(20)]

@@ -36,6 +36,7 @@ from codebotler.simulator.worlds.fact_sampler import FactSampler
 from codebotler.simulator.worlds.robot import SimulatedRobot
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.simulator.worlds.sampled_robot import SampledRobot
+from haste import hasten
 
 FOLDER = Path(__file__).parents[2] / "hostile_tame"
 PROGRAMS = {path.stem: path.read_text(encoding="utf-8") for path in sorted(FOLDER.glob("*.py"))}
@@ -570,7 +571,10 @@ def test_silent_child_is_lost() -> None:
 
 
 @pytest.mark.slow
-def test_program_that_computes_for_too_long_does_not_affect_the_others(batches: Worker) -> None:
+def test_program_that_computes_for_too_long_does_not_affect_the_others(
+    batches: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hasten(monkeypatch)
     source = "def task_program():\n    say('x')\n    say(str(sum(range(10**12))))\n"
     assert is_tame(source)
     before, endless, after = run_together(batches, HONEST, source, HONEST)
