@@ -22,6 +22,7 @@ import yaml
 
 from codebotler.missions.display.wording import _EVENT_WORDERS
 from codebotler.missions.storage.log import MissionState
+from forking_shell import forking
 from server import Server
 
 ROOT = Path(__file__).parents[2]
@@ -67,6 +68,7 @@ SHORTER = {
     "evaluate-your-model.md": [
         ("--num-completions 3\n", "--num-completions 3 --no-report\n"),
         ("--num-completions 50", "--num-completions 1 --tasks LunchTime"),
+        ("clarify runs/recorded-hasty --candidates 3", "clarify runs/again --candidates 2"),
     ],
     "index.md": [("recorded:hasty", "recorded:hasty --tasks LunchBreak")],
     "report.md": [
@@ -87,11 +89,18 @@ COMMAND = re.compile(r"^(?:\.venv/|codebotler |roboeval |python |pip |export |ma
 MODEL = "http://localhost:8000/v1"
 
 SHIM = """\
-#!{python}
-import os, re, signal, socket, subprocess, sys, urllib.error, urllib.request
-command = [sys.executable, "-m", "{name}", *sys.argv[1:]]
+#!{python} -IS
+import json, os, re, signal, socket, sys
+command = [{python!r}, "-m", "{name}", *sys.argv[1:]]
+if "--show-completion" in sys.argv:  # It asks what shell has started it.
+    os.execv(command[0], command)
 if sys.argv[1:2] != ["serve"] or "--help" in sys.argv:
-    os.execv(sys.executable, command)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as line:
+        line.connect({address!r})
+        job = {{"words": command[2:], "cwd": os.getcwd(), "env": dict(os.environ)}}
+        socket.send_fds(line, [json.dumps(job).encode()], [0, 1, 2])
+        sys.exit(int(line.recv(10)))
+import subprocess, urllib.error, urllib.request
 with socket.create_server(("127.0.0.1", 0)) as free:
     port = str(free.getsockname()[1])
 page = subprocess.Popen([*command, "--port", port], stderr=subprocess.PIPE, text=True)
@@ -111,7 +120,7 @@ try:
 finally:
     page.kill()
 """
-"""Replaces a command: it serves a page, opens it like a browser and presses Ctrl-C."""
+"""Replaces a command by one that is forked. A page it serves, opens like a browser, and ends with Ctrl-C."""
 
 PIP = """\
 #!{python}
@@ -152,13 +161,14 @@ class Reader:
 
     folder: Path
     url: str
+    address: Path
     printed: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         if not (self.folder / "examples").exists():
             (self.folder / "examples").symlink_to(ROOT / "examples")
-        self.install("roboeval", SHIM.format(python=sys.executable, name="roboeval"))
-        self.install("codebotler", SHIM.format(python=sys.executable, name="codebotler"))
+        for name in ("roboeval", "codebotler"):
+            self.install(name, SHIM.format(python=sys.executable, name=name, address=str(self.address)))
         self.install("pip", PIP.format(python=sys.executable, site=str(self.folder / "site")))
 
     def install(self, name: str, script: str) -> None:
@@ -199,13 +209,15 @@ class Reader:
 def follow(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Reader]]:
     """Return a function that follows a page once for all tests, with a model that answers quickly."""
     readers: dict[str, Reader] = {}
-    with Server(answer=lambda _: 'def task_program():\n    go_to("kitchen")\n    say("hello")\n') as server:
+    address = tmp_path_factory.mktemp("forking") / "door"
+    answer = 'def task_program():\n    go_to("kitchen")\n    say("hello")\n'
+    with Server(answer=lambda _: answer) as server, forking(address):
 
         def follow(page: str) -> Reader:
             if page not in readers:
                 before = JOURNEY[: JOURNEY.index(page)] if page in JOURNEY else ()
                 folder = follow(before[-1]).folder if before else tmp_path_factory.mktemp("reader")
-                readers[page] = Reader(folder, server.url)
+                readers[page] = Reader(folder, server.url, address)
                 readers[page].follow(page)
             return readers[page]
 
