@@ -19,6 +19,7 @@ import httpx
 import pytest
 from codebotler_openenv import CodebotlerAction, CodebotlerEnv, CodebotlerObservation, CodebotlerState
 from codebotler_openenv.environment import SEEDS
+from openenv.cli.__main__ import app as openenv_app
 from openenv.core.client_types import StepResult
 from openenv.core.sync_client import SyncEnvClient
 from openenv.validation.graders.runtime import basic
@@ -26,6 +27,7 @@ from openenv.validation.manifest import NormalizedManifestV2
 from openenv.validation.parsers.openenv_yaml import OpenEnvYamlParser
 from openenv.validation.runtime.collector import collect_runtime_evidence
 from openenv.validation.runtime.contracts import load_runtime_plan
+from typer.testing import CliRunner
 
 from roboeval.suites.families.suite import FIRST_SEEDS
 from roboeval.suites.families.tasks import family_file, family_names, trained_task
@@ -370,9 +372,8 @@ def test_the_server_listens_only_on_this_machine(url: str) -> None:
 
 
 def validate_with_openenv(*arguments: str) -> dict[str, Any]:
-    command = [str(Path(sys.executable).parent / "openenv"), "validate", *arguments, "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+    done = CliRunner().invoke(openenv_app, ["validate", *arguments, "--json"])
+    assert done.exit_code == 0, done.output
     report = json.loads(done.stdout)
     assert isinstance(report, dict)
     return report

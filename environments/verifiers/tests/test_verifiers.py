@@ -265,20 +265,20 @@ def test_a_mission_that_verifiers_stops_has_reached_a_limit() -> None:
 
 
 def test_the_eval_command_lets_agents_act(tmp_path: Path) -> None:
-    tasks = agent_tasks(4)
+    tasks = agent_tasks(2)
     replies: dict[str, list[dict[str, Any]]] = {}
     for number, task in enumerate(tasks):
         calls = right_calls(task) if number % 2 else []
         replies[instruction_of(task)] = [*({"tool": call} for call in calls), {"content": "Done."}]
     with serve_replies(replies) as url:
-        options = eval_options(url, tmp_path, 4, AGENT_FAMILY)
+        options = eval_options(url, tmp_path, 2, AGENT_FAMILY)
         run(SCRIPTS / "vf-eval", *options, "--env.taskset.mode", "agent")
     traces = [trace for one in read_lines(tmp_path / "run" / "traces.jsonl") for trace in one["traces"]]
     assert all(trace["ok"] for trace in traces)
     scores = {trace["task"]["key"]: trace["rewards"]["reward"]["score"] for trace in traces}
     assert scores == {task.key: float(number % 2) for number, task in enumerate(tasks)}
     offered = [{tool["name"] for tool in trace["tools"]} for trace in traces]
-    assert offered == [{tool["function"]["name"] for tool in mission_tools()}] * 4
+    assert offered == [{tool["function"]["name"] for tool in mission_tools()}] * 2
     results = [node["message"]["content"] for trace in traces for node in trace["nodes"]
                if node["message"]["role"] == "tool"]  # fmt: skip
     assert results == ["done"] * sum(len(right_calls(task)) for task in tasks[1::2])
