@@ -21,6 +21,15 @@ from typing import IO, Any, Self
 
 PAGE = ("codebotler.web.server", "roboeval.web.pages")
 """What a page needs besides, and other commands do not."""
+PROGRAMS = (
+    *("codebotler.cli.operating.run", "codebotler.cli.programs.check", "codebotler.cli.programs.generate"),
+    *("codebotler.cli.programs.rules", "codebotler.generation.generate", "codebotler.missions.session"),
+    *("codebotler.robots.open", "codebotler.robots.simulated", "roboeval.analysis.resample"),
+    *("roboeval.cli.views.completions", "roboeval.cli.views.results", "roboeval.cli.views.tasks"),
+    *("roboeval.evaluation.evaluate", "roboeval.evaluation.generating.generate"),
+    *("asyncio", "polars", "rich.live", "rich.syntax", "rich.table"),
+)
+"""What most other commands need."""
 LONGEST = 1_000_000  # bytes of a request
 
 
@@ -44,7 +53,7 @@ class Forked:
         cwd: Path,
         environment: Mapping[str, str],
         stderr: IO[str] | None = None,
-        preload: Sequence[str] = (),
+        preload: Sequence[str] = PROGRAMS,
         server: Server | None = None,
     ) -> None:
         self._server = server or SERVER

@@ -12,17 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from forked import LONGEST, become
-
-PRELOADED = (
-    *("codebotler.cli.operating.run", "codebotler.cli.programs.check", "codebotler.cli.programs.generate"),
-    *("codebotler.cli.programs.rules", "codebotler.generation.generate", "codebotler.missions.session"),
-    *("codebotler.robots.open", "codebotler.robots.simulated", "roboeval.analysis.resample"),
-    *("roboeval.cli.views.completions", "roboeval.cli.views.results", "roboeval.cli.views.tasks"),
-    *("roboeval.evaluation.evaluate", "roboeval.evaluation.generating.generate"),
-    *("asyncio", "openai.resources.chat", "polars", "rich.live", "rich.syntax", "rich.table"),
-)
-"""Modules that only some of the commands import."""
+from forked import LONGEST, PROGRAMS, become
 
 
 @contextmanager
@@ -63,7 +53,7 @@ def serve(door: socket.socket) -> list[str]:
 
 if __name__ == "__main__":
     mains = {name: importlib.import_module(f"{name}.__main__").main for name in ("codebotler", "roboeval")}
-    for module in PRELOADED:
+    for module in (*PROGRAMS, "openai.resources.chat"):
         importlib.import_module(module)
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listening:
         listening.bind(sys.argv[1])
