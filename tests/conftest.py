@@ -5,6 +5,7 @@ import os
 import signal
 import ssl
 from collections.abc import Generator, Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,6 +15,7 @@ from hypothesis import HealthCheck, settings
 import messages
 import processor_time
 import shared_workers
+from codebotler.rtl.text import claims
 from codebotler.simulator.process.isolated_call import ClosedProcess
 from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite, load_suite
@@ -112,6 +114,14 @@ def no_certificate_authorities() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ssl.SSLContext, "load_verify_locations", load_others)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def known_clauses() -> Iterator[None]:
+    """Keep the clauses of more texts than a user's process does: the linter reads most of its texts often."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(claims, "_polarities", lru_cache(100_000)(claims._polarities.__wrapped__))
         yield
 
 
