@@ -338,30 +338,28 @@ print(count([*evaluate([completion], load_suite())]))
 """
 
 
-@pytest.fixture(scope="module")
-def mypy_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder for the type checker's cache."""
-    pytest.importorskip("mypy")
-    return tmp_path_factory.mktemp("typed")
+MISTAKES = {
+    "reads": ('row["passed"]', 'row["pased"]', 'TypedDict "Row" has no key "pased"'),
+    "gives": ("prompt=0", "prompt='0'", 'incompatible type "str"; expected "int"'),
+    "names": (", program=", ", text=", 'Unexpected keyword argument "text"'),
+}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("right", "wrong", "found"),
-    [
-        ("", "", "Success: no issues found"),
-        ('row["passed"]', 'row["pased"]', 'TypedDict "Row" has no key "pased"'),
-        ("prompt=0", "prompt='0'", 'incompatible type "str"; expected "int"'),
-        (", program=", ", text=", 'Unexpected keyword argument "text"'),
-    ],
-)
-def test_type_checker_finds_mistakes(right: str, wrong: str, found: str, mypy_folder: Path) -> None:
-    uses = mypy_folder / "uses.py"
-    uses.write_text(USES.replace(right, wrong) if right else USES)
-    words = [sys.executable, "-m", "mypy", "--strict", "--follow-imports", "silent", "uses.py"]
+def test_type_checker_finds_mistakes_and_nothing_else(tmp_path: Path) -> None:
+    pytest.importorskip("mypy")
+    (tmp_path / "uses.py").write_text(USES)
+    for name, (right, wrong, _) in MISTAKES.items():
+        (tmp_path / f"{name}.py").write_text(USES.replace(right, wrong))
+    files = ["uses.py", *(f"{name}.py" for name in MISTAKES)]
+    words = [sys.executable, "-m", "mypy", "--strict", "--follow-imports", "silent", *files]
     env = {**os.environ, "MYPYPATH": str(ROOT / "src")}
-    ended = subprocess.run(words, cwd=mypy_folder, env=env, capture_output=True, text=True, check=False)
-    assert found in ended.stdout
+    ended = subprocess.run(words, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    lines = ended.stdout.splitlines()
+    for name, (_, _, found) in MISTAKES.items():
+        assert any(line.startswith(f"{name}.py:") and found in line for line in lines), ended
+    assert not any(line.startswith("uses.py:") for line in lines), ended
+    assert lines[-1].endswith("(checked 4 source files)")
 
 
 def test_missing_file_of_completions_is_refused() -> None:
