@@ -547,7 +547,7 @@ def test_stop_just_before_the_program_prevents_its_start(home: Path, monkeypatch
 def test_stop_at_any_moment_ends_as_stopped(home: Path) -> None:
     for number in range(8):
         with Reservation(FakeRobot(), home) as reserved, prepare(home, STUBBORN) as mission:
-            threading.Timer(0.25 * number, mission.stop).start()
+            threading.Timer(0.12 * number, mission.stop).start()
             state = MissionState.STOPPED
             while mission.state is MissionState.APPROVED:
                 try:
