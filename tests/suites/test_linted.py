@@ -7,23 +7,36 @@ import pytest
 
 from codebotler.core.trace import Event, Option
 from codebotler.rtl import holds
+from plain_words import expect_plain_words, explain_failures
 from roboeval.linting.findings import Finding, render
 from roboeval.linting.lint import lint
-from roboeval.linting.task_findings import judge_solutions
+from roboeval.linting.task_findings import Verdicts, judge_solutions
 from roboeval.suites.load import Suite, load_suite
 
 
 @pytest.fixture(scope="module")
-def paper_findings() -> list[Finding]:
+def paper_verdicts() -> dict[str, list[Verdicts]]:
     suite = load_suite("paper")
-    return [
-        one for task in suite.tasks.values() for one in lint(task, judge_solutions(task, suite, workers=2))
-    ]
+    return {name: judge_solutions(task, suite, workers=2) for name, task in suite.tasks.items()}
+
+
+@pytest.fixture(scope="module")
+def paper_findings(paper_verdicts: dict[str, list[Verdicts]]) -> list[Finding]:
+    suite = load_suite("paper")
+    return [one for name, task in suite.tasks.items() for one in lint(task, paper_verdicts[name])]
 
 
 def test_the_papers_suite_has_no_open_finding(paper_findings: list[Finding]) -> None:
     assert [one.name for one in paper_findings if one.accepted is None] == []
     assert re.search(rf"^{len(paper_findings)} accepted findings .*--accepted", render(paper_findings))
+
+
+def test_explanations_of_wrong_solutions_of_the_paper_show_no_regex(
+    paper_verdicts: dict[str, list[Verdicts]],
+) -> None:
+    found = explain_failures(one for task in paper_verdicts.values() for several in task for one in several)
+    assert len(found) > 100
+    expect_plain_words(found)
 
 
 def test_a_finding_appears_if_it_is_not_accepted(paper: Suite) -> None:

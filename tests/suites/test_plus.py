@@ -14,6 +14,7 @@ import yaml
 from codebotler.core.world import World
 from codebotler.models.recorded import Solution
 from codebotler.simulator.engine import run
+from plain_words import expect_plain_words, explain_failures
 from roboeval.evaluation.judging.failures import Verdict
 from roboeval.evaluation.judging.judge import judge
 from roboeval.linting.lint import lint
@@ -175,6 +176,13 @@ def test_solutions_are_judged_as_declared(name: str) -> None:
 @each_task
 def test_the_linter_finds_nothing(name: str) -> None:
     assert lint(plus().tasks[name], solution_verdicts(name)) == []
+
+
+@each_task
+def test_explanations_of_wrong_solutions_show_no_regex(name: str) -> None:
+    found = explain_failures(one for several in solution_verdicts(name) for one in several[::5])
+    assert len(found) > 10
+    expect_plain_words(found)
 
 
 HARMLESS = """
