@@ -28,6 +28,7 @@ from codebotler.cli.operating.mcp import serve_agents
 from codebotler.core.errors import UserError
 from codebotler.missions.storage.store import read_missions
 from codebotler.web.security.access import Access, Role
+from forked import PAGE, PROGRAMS, Forked
 from pageserver import WORLD, PageServer
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
@@ -392,36 +393,38 @@ def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path) -> None:
     "ending", ["signal", "early signal", "closed terminal", "closed input", "closed input, nothing read"]
 )
 def test_a_running_robot_stops_with_the_server(folder: Path, ending: str) -> None:
-    with subprocess.Popen(
-        command(),
-        cwd=folder,
-        env=environment(folder),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-    ) as running:
-        assert running.stdin is not None
+    _, _, *words = command()
+    with (
+        Path(os.devnull).open("w") as nowhere,
+        Forked(
+            *words,
+            cwd=folder,
+            environment=environment(folder),
+            stderr=nowhere,
+            preload=(*PAGE, *PROGRAMS, "codebotler.agents.server"),
+        ) as running,
+    ):
         assert running.stdout is not None
         asking = {**INITIALIZE, "params": {**INITIALIZE["params"], "capabilities": {"elicitation": {}}}}  # type: ignore[dict-item]  # a dictionary
-        running.stdin.write(pack(asking, {"jsonrpc": "2.0", "method": "notifications/initialized"}))
-        running.stdin.write(pack(request(2, "propose_mission", program=FAR)))
-        running.stdin.flush()
+        running.stdin.buffer.write(pack(asking, {"jsonrpc": "2.0", "method": "notifications/initialized"}))
+        running.stdin.buffer.write(pack(request(2, "propose_mission", program=FAR)))
+        running.stdin.buffer.flush()
         while (message := json.loads(running.stdout.readline())).get("id") != 2:
             pass
         digest = message["result"]["structuredContent"]["digest"]
-        running.stdin.write(pack(request(3, "run_mission", digest=digest)))
-        running.stdin.flush()
+        running.stdin.buffer.write(pack(request(3, "run_mission", digest=digest)))
+        running.stdin.buffer.flush()
         while (message := json.loads(running.stdout.readline())).get("method") != "elicitation/create":
             pass
         result = {"action": "accept", "content": {"approve": True}}
-        running.stdin.write(pack({"jsonrpc": "2.0", "id": message["id"], "result": result}))
-        running.stdin.flush()
+        running.stdin.buffer.write(pack({"jsonrpc": "2.0", "id": message["id"], "result": result}))
+        running.stdin.buffer.flush()
         wait_for_event(folder, "running" if ending == "early signal" else "skill")
         if ending.endswith(("signal", "terminal")):
             running.send_signal(signal.SIGHUP if ending == "closed terminal" else signal.SIGTERM)
             running.wait(SOON)
         elif ending == "closed input, nothing read":
-            running.stdin.write(pack(*(request(number, "read_robot") for number in range(4, 300))))
+            running.stdin.buffer.write(pack(*(request(number, "read_robot") for number in range(4, 300))))
         running.stdin.close()
         if ending != "closed input, nothing read":
             running.stdout.read()
