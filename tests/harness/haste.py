@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import signal
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,7 +18,9 @@ LIMIT = re.compile(r"^Max cpu time +(\S+) +(\S+)", re.MULTILINE)
 
 
 def hasten(patch: pytest.MonkeyPatch) -> None:
-    """Let a process that is silent for a second have reached the limit of its time, which it must have."""
+    """Let a process that is silent for a second have reached its time limit, which it must have. Linux only."""
+    if sys.platform != "linux":
+        return
     examine: Callable[[IsolatedProcess, int | None], int | None] = IsolatedProcess._check_progress
 
     def end_and_examine(process: IsolatedProcess, before: int | None) -> int | None:
