@@ -18,7 +18,7 @@ LIMIT = re.compile(r"^Max cpu time +(\S+) +(\S+)", re.MULTILINE)
 
 
 def hasten(patch: pytest.MonkeyPatch) -> None:
-    """Let a process that is silent for a second have reached its time limit, which it must have. Linux only."""
+    """On Linux, let a process that is silent for a second have reached its time limit, which it must have."""
     if sys.platform != "linux":
         return
     examine: Callable[[IsolatedProcess, int | None], int | None] = IsolatedProcess._check_progress

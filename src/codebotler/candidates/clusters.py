@@ -97,27 +97,25 @@ class CandidateClusters:
     @property
     def summary(self) -> str:
         """A phrase about the choice of a cluster: "took the most frequent behaviour: 3 of 4 programs"."""
-        largest, total = self.clusters[0], counted(self.total, "program")
+        some, largest, total = self.rejected, self.clusters[0], counted(self.total, "program")
         if not largest.samples:
-            every = counted(self.total + len(self.rejected), "program")
+            every = counted(self.total + len(some), "program")
             return f"the check rejected all of {every}; took the first"
-        rejected = f"; the check rejected {len(self.rejected)}{main_reason(self.rejected)}" * bool(
-            self.rejected
-        )
+        rejected = f"; the check rejected {len(some)}{main_reason(some)}" if some else ""
         rejected += f"; {self.unwanted} would do what was not meant" if self.unwanted else ""
-        if self.unwanted and len(self.clusters) == 1:
-            return f"took the only behaviour that was not refused: {largest.size} of {total}{rejected}"
         if len(self.clusters) == 1:
-            return f"all of {total} behave alike{rejected}"
-        if any(other.size == largest.size for other in self.clusters[1:]):
-            return f"took the first of the most frequent behaviours: {largest.size} of {total}{rejected}"
-        return f"took the most frequent behaviour: {largest.size} of {total}{rejected}"
+            other = "other " * bool(self.unwanted)
+            return f"all of {counted(self.total, f'{other}program')} behave alike{rejected}"
+        is_tie = self.clusters[1].size == largest.size  # they are in the order of their sizes
+        most = "first of the most frequent behaviours" if is_tie else "most frequent behaviour"
+        return f"took the {most}: {largest.size} of {total}{rejected}"
 
 
 def main_reason(rejected: Sequence[str]) -> str:
     """Return the most frequent of some problems: ` (2 of them: there is no lab)`; empty if there are none."""
     for problem, count in Counter(rejected).most_common(1):
-        return f" ({f'{count} of them: ' * (len(rejected) > 1)}{shortened(problem)})"
+        share = "all" if count == len(rejected) else count
+        return f" ({f'{share} of them: ' * (len(rejected) > 1)}{shortened(problem)})"
     return ""
 
 
@@ -143,9 +141,8 @@ def cluster_candidates(
     counts = Counter(programs)
     checks = {program: check_on(worker, program, room_map, settings) for program in counts}
     accepted = [program for program, found in checks.items() if not found.problems]
-    rejected = tuple(
-        found.problems[0].message for found in map(checks.__getitem__, programs) if found.problems
-    )
+    first = [one for program in programs for one in checks[program].problems[:1]]
+    rejected = tuple(f"{problem.kind}: {problem.message}" for problem in first)
     if not accepted:
         return CandidateClusters((CandidateCluster((programs[0],), 1, (), ()),), rejected[1:])
     rooms = room_map or shared_rooms(accepted, [checks[one].room_map for one in accepted], settings)

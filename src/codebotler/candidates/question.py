@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -33,6 +34,7 @@ MAX_CANDIDATE_OPTIONS, MAX_QUESTION_FACTS = 3, 4
 NOTICED_FIRST = frozenset({"said", "moved", "asked", "room"})
 """The fields of a `Behaviour` that a person cares about most."""
 
+ABSENCE = re.compile('^nobody|" is not in "')
 NOTICED_KINDS = frozenset({SAY, ASK, PICK, PLACE})
 
 ClarifyingAnswer: TypeAlias = int | Literal["none", "decide"]
@@ -225,7 +227,7 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
         asked = Counter(fact.names[:-1] for fact in drawn if fact.form == ANSWER_FORM)
         # The steps of each option show its answer, if options get different answers to the same words.
         kept = [one for one in drawn if one.form != ANSWER_FORM or asked[one.names[:-1]] == 1]
-        return [one.sentence for one in sorted(kept, key=lambda one: one.is_absence)]
+        return sorted((one.sentence for one in kept), key=lambda one: bool(ABSENCE.search(one)))
 
     same = [world for world in range(len(shown[0].samples)) if len({o.behaviours[world] for o in shown}) == 1]
     alike = [set(facts(world)) for world in same]

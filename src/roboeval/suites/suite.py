@@ -165,7 +165,8 @@ def _build_suite(
     documents = [YamlFile.read(path) for path in paths]
     words = head.rules.words_for_people
     own = [folder / name for name in head.skills]
-    skills = skills.with_skills(skills_from(*own)) if own else skills
+    new = (row for name, row in skills_from(*own).items() if name not in skills) if own else ()
+    skills = SkillTable((*skills.rows, *new)) if own else skills
     lenders = [_lender(file, head.instructions, path) if head.instructions else None for path in paths]
     tasks = [
         read_task(document, path, skills, lender=lender, count=count, seed=seed, words=words)

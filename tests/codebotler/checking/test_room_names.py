@@ -51,6 +51,8 @@ def rooms(*lines: str) -> tuple[str, ...]:
         (['if get_current_location() == "hall":', "    pass"], ("hall",)),
         (['if "lab" in get_all_rooms():', "    pass"], ("lab",)),
         (['go_to("b")', 'go_to("a")', 'go_to("b")'], ("b", "a")),
+        (['go_to([r for r in ["lab"] for r in [r, "hall"]][0])'], ("lab", "hall")),
+        (['room = "lab"', "[go_to(r) for r in [room]]", "[r for r in [room, 'x']]"], ("lab",)),
     ],
 )
 def test_rooms_that_a_program_names_are_found(lines: list[str], named: tuple[str, ...]) -> None:
@@ -65,6 +67,7 @@ def test_rooms_that_a_program_names_are_found(lines: list[str], named: tuple[str
         ['for name in ["ann", "bob"]:', """    go_to(name + "'s office")"""],
         ["for i in range(3):", '    go_to(f"room {i}")'],
         ['go_to("1")'],
+        ["for r in get_all_rooms():", "    go_to(r)", 'sum(r in ["jerky", "ham"] for r in ["jerky"])'],
         ["go_to(", "x"],
     ],
 )

@@ -24,13 +24,14 @@ CHANGES = frozenset({"insert", "update", "setdefault", "appendleft"})
 """Methods after which a list or dictionary may have unknown elements."""
 
 SEQUENCES = ast.List | ast.Tuple | ast.ListComp
+COMPREHENSIONS = ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.DictComp
 
 PossibleValue: TypeAlias = ast.expr | None
 """An expression that gives a value, or None for an unknown one."""
 
 
 class PossibleValues:
-    """Finds which values an expression may have. It ignores scopes and the order of statements.
+    """Finds which values an expression may have. It ignores the scopes of functions, and all order.
 
     Args:
         tree: the program.
@@ -41,6 +42,13 @@ class PossibleValues:
     def __init__(self, tree: ast.Module, *, guess_entries: bool = False) -> None:
         self._guess_entries = guess_entries
         self._values: defaultdict[str, list[PossibleValue]] = defaultdict(list)  # by name
+        self._own: dict[ast.AST, str] = {}  # the names of the variables of comprehensions, inner ones last
+        for node in nodes(tree):
+            if isinstance(node, COMPREHENSIONS):
+                bound = {n.id for g in node.generators for n in ast.walk(g.target) if isinstance(n, ast.Name)}
+                inside = {*ast.walk(node)} - {*ast.walk(node.generators[0].iter)}
+                own = (one for one in inside if isinstance(one, ast.Name) and one.id in bound)
+                self._own |= {one: f"{one.id} {node.lineno} {node.col_offset}" for one in own}
         self._functions = {node.name: node for node in nodes(tree) if isinstance(node, ast.FunctionDef)}
         self._returned: dict[str, list[PossibleValue]] = {
             name: [node.value for node in ast.walk(function) if isinstance(node, ast.Return)]
@@ -55,6 +63,10 @@ class PossibleValues:
             elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
                 self._bind_parameters(node, self._functions.get(node.func.id))
 
+    def variable(self, name: ast.Name) -> str:
+        """Return a variable's name, which differs between comprehensions, as each has its own."""
+        return self._own.get(name, name.id)
+
     def of(self, node: ast.expr) -> list[PossibleValue]:
         """Return the expressions that may give a node its value: "hall" for `room` after `room = "hall"`."""
         found: list[PossibleValue] = []
@@ -65,7 +77,7 @@ class PossibleValues:
             parts = None if one is None else self._parts(one)
             if one is None or parts is None:
                 found.append(one)
-            elif (key := one.id if isinstance(one, ast.Name) else one) not in seen:
+            elif (key := self.variable(one) if isinstance(one, ast.Name) else one) not in seen:
                 seen.add(key)
                 waiting += parts
         return found
@@ -74,8 +86,8 @@ class PossibleValues:
         """Return the expressions of which one is the value, or an element, of another; None if unknown."""
         parts: Sequence[PossibleValue] | None = None
         match node:
-            case ast.Name(name):
-                parts = self._values.get(name, [None])
+            case ast.Name():
+                parts = self._values.get(self.variable(node), [None])
             case ast.Call(ast.Name(name)) if name in self._functions:
                 parts = self._returned[name]
             case ast.Call(ast.Name(name), [*_, value]) if name in SAME_VALUES:
@@ -98,14 +110,16 @@ class PossibleValues:
         match node:
             case ast.BinOp(left, ast.Add(), right):
                 return self._is_list(left) or self._is_list(right)
-            case ast.Name(name):
-                return any(isinstance(value, SEQUENCES) for value in self._values.get(name, ()))
+            case ast.Name():
+                return any(
+                    isinstance(value, SEQUENCES) for value in self._values.get(self.variable(node), ())
+                )
         return isinstance(node, SEQUENCES)
 
     def _bind(self, target: ast.expr, value: PossibleValue) -> None:
         match target, value:
-            case ast.Name(name), _:
-                self._values[name].append(value)
+            case ast.Name() as name, _:
+                self._values[self.variable(name)].append(value)
             case ((ast.Tuple(targets) | ast.List(targets)), (ast.Tuple(values) | ast.List(values))) if len(
                 targets
             ) == len(values):

@@ -84,7 +84,7 @@ class _RoomNames:
     def rooms(self) -> list[str]:
         """Return the names of rooms, in the order of the program's source."""
         found = {text for _, request in _requests(self.tree, self.drives) for text in self.texts(request)}
-        driven = {_variable(request) for _, request in _requests(self.tree, self.drives)} - {None}
+        driven = {self._variable(request) for _, request in _requests(self.tree, self.drives)} - {None}
         for node in nodes(self.tree):
             found |= self._compared(node, driven)
         return [text for _, _, text in sorted(found - {A_ROOM}) if any(map(str.isalpha, text))]
@@ -103,7 +103,7 @@ class _RoomNames:
     def _compared(self, node: ast.AST, driven: set[str | None]) -> set[TextLiteral]:
 
         def is_room(side: ast.expr) -> bool:
-            return A_ROOM in self.texts(side) or _variable(side) in driven
+            return A_ROOM in self.texts(side) or self._variable(side) in driven
 
         match node:
             case ast.Compare(left, _, [right]):
@@ -115,12 +115,11 @@ class _RoomNames:
                 return self.texts(text)
         return set()
 
-
-def _variable(node: ast.expr) -> str | None:
-    """Return the variable that an expression consists of or reads from, or None."""
-    match node:
-        case ast.Name(name):
-            return name
-        case ast.Subscript(value) | ast.Call(ast.Attribute(value)):
-            return _variable(value)
-    return None
+    def _variable(self, node: ast.expr) -> str | None:
+        """Return the variable that an expression consists of or reads from, or None."""
+        match node:
+            case ast.Name():
+                return self.values.variable(node)
+            case ast.Subscript(value) | ast.Call(ast.Attribute(value)):
+                return self._variable(value)
+        return None

@@ -218,10 +218,6 @@ class SkillTable(Mapping[str, Skill]):
         """Return a copy of this table with one more skill."""
         return SkillTable((*self.rows, skill))
 
-    def with_skills(self, others: Mapping[str, Skill]) -> SkillTable:
-        """Return a copy of this table with those skills of another table whose names this table lacks."""
-        return SkillTable((*self.rows, *(row for name, row in others.items() if name not in self)))
-
     def without(self, names: Iterable[str]) -> SkillTable:
         """Return a copy of this table without the skills that have these names."""
         omitted = {*names}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Any, TypeAlias
 
 from codebotler.core.world import Point, Room
@@ -38,11 +37,6 @@ def frame_transform(at: Point, heading: float, time: int) -> Message:
     }
 
 
-def scene_update(rooms: Iterable[Room], time: int) -> Message:
-    """Build a message with the outlines and names of rooms. Each needs a footprint and a stopping point."""
-    return {"entities": [_entity(room, time) for room in rooms]}
-
-
 def log_line(level: int, message: str, name: str, line: int | None, time: int) -> Message:
     """Build a log message. `name`: a skill or event kind; `line`: of the program; `time`: ns since 1970."""
     where = {"file": "", "line": 0} if line is None else {"file": "program.py", "line": line}
@@ -67,7 +61,8 @@ def _pose(at: Point, heading: float = 0.0) -> Message:
     return {"position": _vector(at), "orientation": turn}
 
 
-def _entity(room: Room, time: int) -> Message:
+def scene_entity(room: Room, time: int) -> Message:
+    """Build a message with the outline and the name of a room, which has a footprint and a stopping point."""
     assert room.footprint is not None, "rooms are laid out"
     assert room.stand_at is not None, "rooms are laid out"
     outline = {

@@ -146,7 +146,8 @@ class _RobotPath:
         """Yield messages if an event contains the map or changes the robot's position."""
         if line["event"] == "map":
             self._world = map_from(line)
-            yield TopicMessage("/rooms", foxglove.scene_update(self._world.rooms, at), "foxglove.SceneUpdate")
+            rooms = {"entities": [foxglove.scene_entity(room, at) for room in self._world.rooms]}
+            yield TopicMessage("/rooms", rooms, "foxglove.SceneUpdate")
         else:
             self._progress = self._progress.after(line)
         now, before = self._position(), self._at

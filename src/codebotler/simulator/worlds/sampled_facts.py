@@ -25,11 +25,6 @@ class SampledFact:
     is_random: bool = True
 
     @property
-    def is_absence(self) -> bool:
-        """Whether the fact says that somebody or something is not in a room."""
-        return self.form.startswith("nobody") or " is not in " in self.form
-
-    @property
     def sentence(self) -> str:
         """The fact in words, such as `"mug" is in "hall"`. In names, double quotes become single ones."""
         names = map(brief, self.names)

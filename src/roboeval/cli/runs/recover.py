@@ -105,5 +105,6 @@ def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
         "passed, rejected (by the check), failed: shares of the continued missions, without the missing ones",
         "steps: those of the missions that passed; no fault: those of the same missions without a fault",
         "repeated: how often robots spoke, picked up or put down more than without a fault",
+        "--json lists the missions, and why the rest of each was rejected or failed",
     ]
     return Group(Text(title, "bold"), Text(), table, *(Text(line, "dim") for line in lines))
