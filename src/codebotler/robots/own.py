@@ -157,11 +157,11 @@ class OwnRobot:
                 self._stop_returned.clear()
                 threading.Thread(target=self._call_stop, daemon=True).start()
         self.clock.stop()
-        cancelled = self._cancel_running()
+        running, loop = self._running, self._loop
+        if running is not None and loop is not None:  # the method counts as running until it has cleaned up
+            loop.call_soon_threadsafe(running.cancel)
         if not self._stop_returned.wait(STOP_SECONDS):
             self.failed_stop = f"{self.name}.stop failed: it took too long; {STOP_BY_HAND}"
-        if self._running is not cancelled:  # it may have begun just before
-            self._cancel_running()
 
     def _call_stop(self) -> None:
         try:
@@ -173,12 +173,6 @@ class OwnRobot:
             self.failed_stop = ""
         finally:
             self._stop_returned.set()
-
-    def _cancel_running(self) -> asyncio.Task[Any] | None:
-        running, loop = self._running, self._loop
-        if running is not None and loop is not None:  # the method counts as running until it has cleaned up
-            loop.call_soon_threadsafe(running.cancel)
-        return running
 
     def disconnect(self) -> None:
         """Stop a running method, call the object's `disconnect` if it has one, and end the event loop."""
@@ -205,6 +199,9 @@ class OwnRobot:
         async def run() -> Any:  # noqa: ANN401 - as above
             if patience is None:
                 self._running = asyncio.current_task()
+                if self._stopped:  # just now, when there was nothing to cancel yet
+                    result.close()
+                    raise CancelledError
             return await result
 
         future = asyncio.run_coroutine_threadsafe(run(), self._loop)

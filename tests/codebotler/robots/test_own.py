@@ -234,6 +234,26 @@ def test_a_running_async_method_ends_before_stop_has_returned(write: Write) -> N
     assert robot._body.brakes < 10  # type: ignore[attr-defined]  # of a class in a file
 
 
+def test_an_async_method_does_not_begin_after_a_stop(write: Write) -> None:
+    robot = write(
+        """
+    began = False
+    def rooms(self): return ["hall"]
+    def stop(self): pass
+    def go_to(self, location):
+        self.before()
+        return self.drive()
+    async def drive(self): self.began = True
+"""
+    )
+    robot.connect()
+    body = robot._body  # type: ignore[attr-defined]  # of a class in a file
+    body.before = robot.cancel
+    with pytest.raises(CancelledError):
+        robot.perform("go_to", ["hall"])
+    assert not body.began
+
+
 @pytest.mark.parametrize("leaves", [False, True], ids=["stop", "disconnect"])
 def test_a_cancelled_method_counts_as_running_until_it_has_cleaned_up(write: Write, *, leaves: bool) -> None:
     robot = write(
