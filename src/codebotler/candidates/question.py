@@ -209,7 +209,7 @@ def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, ...]:
     """Rank a world: by the number of options, their candidates, what a person cares about, and brevity.
 
     Options that all act, but in different rooms, differ more than those that only say something else. Where
-    an option does more, a person sees better what it is for. The largest cluster counts first.
+    an option does more, especially the first one, a person sees better what it is for.
     """
     first, *others = (one.behaviours[number] for one in shown)
     cares = sum(bool(first.differences(other) & NOTICED_FIRST) for other in others)

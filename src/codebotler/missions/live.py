@@ -117,13 +117,14 @@ class LiveRobot:
                 self._room, self._has_asked = None, False
 
     def _execute(self, row: Skill, arguments: Sequence[Argument]) -> Result:
-        is_drive = row.is_drive
+        is_drive, words = row.is_drive, list[str]()
         if is_drive:  # rules must judge exactly the text that the robot receives
-            given = zip(row.parameters, arguments, strict=True)
+            given = [*zip(row.parameters, arguments, strict=True)]
+            words = [str(one) for to, one in given if is_goal(row, to.name)]
             arguments = [self._listed(one) if is_goal(row, to.name) else one for to, one in given]
         event = attempted_event(row, arguments, place=self._place, time=self.now, holding=self._held)
         self._judge_call(row, arguments)
-        room = "" if event is None else self._judge(event, is_drive=is_drive)
+        room = "" if event is None else self._judge(event, words, is_drive=is_drive)
         if event and row.recording and row.recording.when_tried:
             self._events.append(event)
         try:
@@ -151,8 +152,7 @@ class LiveRobot:
     def _listed(self, goal: Argument) -> Argument:
         """Return the listed room that a goal means on a robot with its own planner, or a goal as it is.
 
-        Raise RobotError if it names several listed rooms, or one only as a part, such as "lab 1" in "lab 12",
-        since this robot might drive to any of them, or to a room that nobody has approved.
+        Raise RobotError if it names several listed rooms, or has one in a longer word, such as "kitchenette".
         """
         if not isinstance(goal, str):
             return goal
@@ -178,8 +178,8 @@ class LiveRobot:
         with self._enforcing():
             guard.judge_call(row, arguments, [*chain.from_iterable(goals)], self._room or "")
 
-    def _judge(self, event: Event, *, is_drive: bool) -> str:
-        """Return the robot's room, or raise an error if a rule forbids an event that is about to happen."""
+    def _judge(self, event: Event, words: Sequence[str], *, is_drive: bool) -> str:
+        """Return the robot's room, or raise an error if a rule forbids an event, or a drive with `words`."""
         guard = self._guard
         if guard is None:
             return event.place
@@ -192,7 +192,7 @@ class LiveRobot:
             with self._enforcing():
                 guard.give_up(rules, event)
         room = self._room or ""
-        texts = dict.fromkeys([event.text, *(self._rooms_meant(event.text) if is_drive else ())])
+        texts = dict.fromkeys([event.text, *words, *(self._rooms_meant(event.text) if is_drive else ())])
         with self._enforcing():
             guard.judge(*(replace(event, text=text, place=room) for text in texts), is_drive=is_drive)
         return room

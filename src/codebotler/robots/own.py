@@ -158,8 +158,8 @@ class OwnRobot:
                 threading.Thread(target=self._call_stop, daemon=True).start()
         self.clock.stop()
         running, loop = self._running, self._loop
-        if running is not None and loop is not None:  # the method counts as running until it has cleaned up
-            loop.call_soon_threadsafe(running.cancel)
+        if running is not None and loop is not None:  # another press must not end its clean-up
+            loop.call_soon_threadsafe(lambda: running.cancelling() or running.cancel())
         if not self._stop_returned.wait(STOP_SECONDS):
             self.failed_stop = f"{self.name}.stop failed: it took too long; {STOP_BY_HAND}"
 
@@ -234,11 +234,8 @@ def _expect_fit(kind: str, method: Callable[..., Any], skill: Skill) -> None:
 def _run(loop: asyncio.AbstractEventLoop) -> None:
     try:
         loop.run_forever()
-        left = asyncio.all_tasks(loop)
-        for task in left:
-            if not task.cancelling():  # else it is cleaning up
-                task.cancel()
-        if left:
+        left = [task for task in asyncio.all_tasks(loop) if task.cancelling() or task.cancel()]
+        if left:  # those that were cancelled before are cleaning up
             loop.run_until_complete(asyncio.wait(left, timeout=STOP_SECONDS))
         loop.run_until_complete(loop.shutdown_asyncgens())
     finally:

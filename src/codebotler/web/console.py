@@ -219,7 +219,10 @@ class Console:
 
     def ask_evidence(self, past: MissionPast, remark: Callable[[str], None]) -> list[str]:
         """Return what helps a person to say whether an unsure step happened. A STOP reaches the robot."""
-        button = self._asking = StopButton()
+        with self._lock:
+            if self._asking is not None:
+                raise MissionError("the robot is being asked already")
+            self._asking = button = StopButton()
         try:
             return ask_evidence(self.robot, self.home, past, remark, button)
         finally:
@@ -264,10 +267,6 @@ class Console:
         """Whether a person must approve the next mission, since STOP was pressed or the robot was lost."""
         return self._hold.exists
 
-    def hold(self) -> None:
-        """Have a person approve the next mission."""
-        self._hold.write()
-
     def _end_hold(self) -> None:
         """End the hold after a person's STOP if a person has approved the mission that began after it."""
         session = self.session
@@ -279,12 +278,12 @@ class Console:
         self.interrupted = ()
         self.notifier.change()
 
-    def stop(self, by: str, *, only_moving: bool = False, holds: bool = False) -> bool:
+    def stop(self, by: str, *, only_moving: bool = False, holds: bool = False, always: bool = False) -> bool:
         """Ask the current mission to stop. Return at once whether there was a mission to stop.
 
         `by` names the source for the log. A robot that was lost, or did not confirm a stop, is stopped again.
         With `only_moving`, a mission without approval goes on, unless a robot was lost. With `holds`, a
-        person must approve the next mission.
+        person must approve the next mission, with `always` even if there was nothing to stop.
         """
         with self._lock:
             session, self._may_recover = self.session, None
@@ -302,8 +301,8 @@ class Console:
                 threading.Thread(target=asking.press, args=(by,), daemon=True).start()
             if lost is not None and not self._stopping.is_alive():
                 self._stopping = lost.stop_soon(by)
-            if holds and stops:
-                self._stopped = session
+            if holds and (stops or always):
+                self._stopped = session if stops else self._stopped
                 self._hold.write()
         return stops and (is_active or lost is not None)
 

@@ -75,8 +75,8 @@ def router(console: Console, face: Face) -> APIRouter:
     @routes.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
         """Stop a mission that is approved or runs, and return whether there was one to stop."""
-        console.hold()  # also between two missions of an agent, when the robot stands still for a moment
-        stopping = console.stop(BY_FACE, only_moving=True, holds=True)
+        # Agents wait for a person even if the robot stands still for a moment between two missions.
+        stopping = console.stop(BY_FACE, only_moving=True, holds=True, always=True)
         return {"stopping": stopping, "warning": bool(console.warning or console.used_elsewhere)}
 
     @routes.websocket("/api/face/live")

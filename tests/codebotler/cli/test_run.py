@@ -286,6 +286,42 @@ def test_signal_stops_the_robot(folder: Path, signals: Sequence[int], status: in
     assert states(folder) == ["stopped"]
 
 
+HOMING = """
+import asyncio, pathlib
+
+class Homing:
+    def rooms(self): return ["hall"]
+    async def connect(self):
+        pathlib.Path("began").touch()
+        await asyncio.sleep(60)
+    def stop(self): pathlib.Path("stopped").touch()
+    def go_to(self, location): pass
+    def say(self, message): pass
+    def ask(self, person, question, options): return options[0]
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "status"),
+    [
+        (signal.SIGTERM, 143),
+        pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow),
+        pytest.param(signal.SIGHUP, 129, marks=pytest.mark.slow),
+    ],
+)
+def test_signal_stops_a_robot_that_is_connected(folder: Path, number: signal.Signals, status: int) -> None:
+    (folder / "homing.py").write_text(HOMING)
+    (folder / "say.py").write_text("def task_program():\n    say('it')\n")
+    process = start(folder, "run", "say.py", "--yes", "--robot", "homing.py:Homing")
+    with kill_at_end(process):
+        while not (folder / "began").exists():
+            time.sleep(0.01)
+        process.send_signal(number)
+        process.communicate(timeout=30)
+    assert process.returncode == status
+    assert (folder / "stopped").exists()
+
+
 @pytest.mark.slow
 def test_mission_outlives_its_terminal_with_nohup(folder: Path) -> None:
     process = start_driving(folder, "nohup")

@@ -481,6 +481,14 @@ def test_a_robot_with_its_own_planner_is_sent_the_listed_room(
     assert robot.done[0] == received
 
 
+def test_a_rule_also_covers_the_programs_words_for_a_room(tmp_path: Path) -> None:
+    rooms, robot = RoomMap(("hall", "lab  1"), "hall", plain=True), robot_in("hall")
+    rule = Rule("lab", "Stay out.", parse('not tr.Exists(goto("lab 1"))'))
+    mission, _ = run(tmp_path, robot, "def task_program():\n    go_to('lab 1')\n", [rule], rooms)
+    assert mission.state is MissionState.STOPPED
+    assert not {"lab 1", "lab  1"} & {*robot.done}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "formula",

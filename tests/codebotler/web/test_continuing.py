@@ -249,6 +249,8 @@ def test_stop_reaches_a_robot_that_is_asked_where_it_is(tmp_path: Path) -> None:
     with Console(robot, tmp_path, lambda _: Author()) as console, ThreadPoolExecutor(1) as pool:
         evidence = pool.submit(console.ask_evidence, past, noted.append)
         assert robot.was_asked.wait(10)
+        with pytest.raises(MissionError):
+            console.ask_evidence(past, noted.append)
         assert console.stop("a person", only_moving=True, holds=True)
         assert evidence.result(10)
         assert console.used_elsewhere == ""

@@ -24,7 +24,6 @@ CHANGES = frozenset({"insert", "update", "setdefault", "appendleft"})
 """Methods after which a list or dictionary may have unknown elements."""
 
 SEQUENCES = ast.List | ast.Tuple | ast.ListComp
-COMPREHENSIONS = ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.DictComp
 
 PossibleValue: TypeAlias = ast.expr | None
 """An expression that gives a value, or None for an unknown one."""
@@ -44,7 +43,7 @@ class PossibleValues:
         self._values: defaultdict[str, list[PossibleValue]] = defaultdict(list)  # by name
         self._own: dict[ast.AST, str] = {}  # the names of the variables of comprehensions, inner ones last
         for node in nodes(tree):
-            if isinstance(node, COMPREHENSIONS):
+            if isinstance(node, ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.DictComp):
                 bound = {n.id for g in node.generators for n in ast.walk(g.target) if isinstance(n, ast.Name)}
                 inside = {*ast.walk(node)} - {*ast.walk(node.generators[0].iter)}
                 own = (one for one in inside if isinstance(one, ast.Name) and one.id in bound)

@@ -62,11 +62,13 @@ def run(
 
     Ctrl-C stops the robot, and the exit status is then 130.
     """
-    from codebotler.cli.operating.run import run
+    from codebotler.cli.operating.run import end_at_signals, run
 
     request, open_console = run_settings(**shared)
     wanted = request(program, candidates=candidates)
-    raise typer.Exit(run(open_console(candidates=candidates), wanted))
+    end_at_signals()
+    with open_console(candidates=candidates) as console:
+        raise typer.Exit(run(console, wanted))
 
 
 @inherit_options(run_settings)
@@ -83,12 +85,13 @@ def continue_mission(
 
     A model is shown what the robot did and saw, and writes a program for the rest.
     """
-    from codebotler.cli.operating.run import choose_past, run
+    from codebotler.cli.operating.run import choose_past, end_at_signals, run
 
     request, open_console = run_settings(**shared)
-    console = open_console()
-    past = choose_past(console, mission, program)
-    raise typer.Exit(run(console, request(program or past.instruction, past=past)))
+    end_at_signals()
+    with open_console() as console:
+        past = choose_past(console, mission, program)
+        raise typer.Exit(run(console, request(program or past.instruction, past=past)))
 
 
 def missions(

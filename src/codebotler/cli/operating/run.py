@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from threading import Thread
+from typing import NoReturn
 
 from rich.console import Group
 from rich.text import Text
@@ -88,39 +90,38 @@ def run(console: Console, request: Request) -> int:
         the exit status: 0 if the mission is done, 128 plus the number of a signal that stopped it, or else 1.
     """
     order, approval, begun, session = request.order_on(console), None, SessionView(), None
-    with console:
-        if console.warning:
-            note(console.warning)
-        for left in range(request.recoveries, -1, -1):
-            try:
-                session = console.begin(order, after=session)
-            except MissionError as error:  # a person has pressed STOP since
-                note(error.sentence)
-                print_rich(continue_view(begun))
-                return 1
-            try:
-                status = _carry_out(session, console.robot, request, approval)
-            except KeyboardInterrupt:
-                session.stop(SIGNALS[signal.SIGINT])
+    if console.warning:
+        note(console.warning)
+    for left in range(request.recoveries, -1, -1):
+        try:
+            session = console.begin(order, after=session)
+        except MissionError as error:  # a person has pressed STOP since
+            note(error.sentence)
+            print_rich(continue_view(begun))
+            return 1
+        try:
+            status = _carry_out(session, console.robot, request, approval)
+        except KeyboardInterrupt:
+            session.stop(SIGNALS[signal.SIGINT])
+            raise
+        except ModelError as error:  # without a rest, the status of the first mission counts
+            if left == request.recoveries:
                 raise
-            except ModelError as error:  # without a rest, the status of the first mission counts
-                if left == request.recoveries:
-                    raise
-                note(error.sentence)
-                status = 1
-            begun = session.view if session.view.progress.has_begun else begun
-            past = past_to_recover(session, console.robot, console.home) if left and status == 1 else None
-            if past is None:
-                if status and begun.id:
-                    print_rich(continue_view(begun))
-                return status
-            if approval is None or session.is_approved_by_person:
-                approval = PriorApproval.of(session.view)
-            order = console.rest_of(past)
-            print_rich(past_view(past))
-            note(f"recovering: asking {order.model} for the rest of the mission")
-            request = replace(request, despite_problems=False)  # accepted for the first program only
-        raise AssertionError("the last mission has no rest")
+            note(error.sentence)
+            status = 1
+        begun = session.view if session.view.progress.has_begun else begun
+        past = past_to_recover(session, console.robot, console.home) if left and status == 1 else None
+        if past is None:
+            if status and begun.id:
+                print_rich(continue_view(begun))
+            return status
+        if approval is None or session.is_approved_by_person:
+            approval = PriorApproval.of(session.view)
+        order = console.rest_of(past)
+        print_rich(past_view(past))
+        note(f"recovering: asking {order.model} for the rest of the mission")
+        request = replace(request, despite_problems=False)  # accepted for the first program only
+    raise AssertionError("the last mission has no rest")
 
 
 def _carry_out(
@@ -212,6 +213,17 @@ def _watched(
     return SIGNAL_EXIT_BASE + got[0] if got else 1  # after a signal, nothing is recovered
 
 
+def end_at_signals() -> None:
+    """Let SIGTERM and a closed terminal end this process in order from now on, as Ctrl-C does."""
+
+    def end(number: int, _frame: object) -> NoReturn:
+        raise SystemExit(SIGNAL_EXIT_BASE + number)
+
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, end)
+
+
 @contextmanager
 def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
     """Stop the session when a signal arrives, and yield the list of signals received so far.
@@ -226,8 +238,7 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
         if len(got) > 1:
             note(f"\nasked the robot to stop; the robot has {STOP_GRACE_SECONDS:g} s to confirm")
 
-    outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-    obeyed = [number for number in SIGNALS if not (outlives and number is signal.SIGHUP)]
+    obeyed = [n for n in SIGNALS if n is not signal.SIGHUP or signal.getsignal(n) is not signal.SIG_IGN]
     before = {number: signal.signal(number, obey) for number in obeyed}
     try:
         yield got
@@ -262,7 +273,12 @@ def choose_past(console: Console, name: str, program: str) -> MissionPast:
         raise UserError(
             f"{past.unsure_step_text}; name a program file instead of `-`, since a person must answer here"
         )
-    for sentence in (past.unsure_step_text, *console.ask_evidence(past, note)):
+    evidence = [past.unsure_step_text]
+    # On a thread, so that a signal ends the command meanwhile, and the end of the console stops the robot.
+    asking = Thread(target=lambda: evidence.extend(console.ask_evidence(past, note)))
+    asking.start()
+    asking.join()
+    for sentence in evidence:
         note(sentence)
     happened = _ask_whether(past)
     while happened and past.answers:

@@ -94,14 +94,9 @@ class RosCaller:
         self.clock.restart()
 
     def _request(self, call: SkillCall, request: WorkerMessage, feedback: Feedback) -> Values:
-        """Send a request to the worker and return the robot's answer.
+        """Send a request to the worker and return the robot's answer, or raise an error as `perform` does.
 
         The robot's reason for a failure may start with a kind of error, as in `PickInvalidObject: no mug`.
-
-        Raises:
-            RobotError: the server rejected or aborted the goal.
-            CancelledError: this or another client cancelled the goal.
-            RobotLostError: the server or the worker died, or does not respond.
         """
         message = self._await_end(request, feedback)
         match message:

@@ -232,10 +232,7 @@ class RuleGuard:
                 self.judge_result(event)
 
     def give_up(self, rules: Iterable[Rule], event: Event) -> None:
-        """Stop judging some rules, since the robot's room is unknown.
-
-        Raise RuleViolationError for the first of them that must always hold.
-        """
+        """Stop judging rules whose room is unknown. Raise an error for the first that must always hold."""
         for rule in rules:
             self._history.unjudged.add(rule.name)
             if rule.when == "always":
