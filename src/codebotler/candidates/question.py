@@ -97,12 +97,10 @@ class ClarifyingQuestion:
     @property
     def left_out(self) -> str:
         """A sentence about missing candidates: "Not shown: 2 programs that ..."; empty if none is missing."""
-        left = self.total - sum(one.size for one in self.options)
+        some, left = self.rejected, self.total - sum(one.size for one in self.options)
         parts = [f"{counted(left, 'program')} that would do something else"] if left else []
-        rejected = (
-            f"{counted(len(self.rejected), 'program')} that the check rejects{main_reason(self.rejected)}"
-        )
-        parts += [rejected] if self.rejected else []
+        rejected = f"{counted(len(some), 'program')} that the check rejects{main_reason(some)}"
+        parts += [rejected] if some else []
         return f"Not shown: {listed(parts)}." if parts else ""
 
     @property
