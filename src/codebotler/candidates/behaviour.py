@@ -23,7 +23,7 @@ PAPER_KINDS = frozenset({GOTO, SAY, CHECK, ASK, PICK, PLACE})
 ENDLESS_RUN = "waits"  # the ending of a run that reached a limit
 NO_NAME = re.compile(r"(?!)")  # matches nothing
 MAX_NAMES, MAX_NAME_LENGTH = 200, 60
-MAX_TEXTS, MAX_STATEMENT_LENGTH = 100, 4_000  # of a statement, since a program may talk without end
+MAX_STATEMENT_TEXTS, MAX_STATEMENT_LENGTH = 100, 4_000  # of a statement, since a program may talk without end
 HALF_DAY, ZERO = 12 * 60, (0,)  # minutes, and the time of day that "eggs: 0" might give
 
 Claims: TypeAlias = frozenset[tuple[str, str]]
@@ -102,7 +102,8 @@ def statements(trace: Trace) -> Iterator[tuple[str, str]]:
     for is_drive, some in groupby(spoken, key=lambda one: one.kind == GOTO):
         if not is_drive:
             said = [*some]
-            yield said[0].place, "\n".join(one.text for one in said[:MAX_TEXTS])[:MAX_STATEMENT_LENGTH]
+            text = "\n".join(one.text for one in said[:MAX_STATEMENT_TEXTS])
+            yield said[0].place, text[:MAX_STATEMENT_LENGTH]
 
 
 def wording(trace: Trace) -> frozenset[str]:

@@ -278,12 +278,12 @@ class Console:
         self.interrupted = ()
         self.notifier.change()
 
-    def stop(self, by: str, *, only_moving: bool = False, holds: bool = False, always: bool = False) -> bool:
+    def stop(self, by: str, *, only_moving: bool = False, holds: bool = False) -> bool:
         """Ask the current mission to stop. Return at once whether there was a mission to stop.
 
         `by` names the source for the log. A robot that was lost, or did not confirm a stop, is stopped again.
         With `only_moving`, a mission without approval goes on, unless a robot was lost. With `holds`, a
-        person must approve the next mission, with `always` even if there was nothing to stop.
+        person must approve the next mission, even if there was nothing to stop.
         """
         with self._lock:
             session, self._may_recover = self.session, None
@@ -301,7 +301,7 @@ class Console:
                 threading.Thread(target=asking.press, args=(by,), daemon=True).start()
             if lost is not None and not self._stopping.is_alive():
                 self._stopping = lost.stop_soon(by)
-            if holds and (stops or always):
+            if holds:
                 self._stopped = session if stops else self._stopped
                 self._hold.write()
         return stops and (is_active or lost is not None)

@@ -75,8 +75,7 @@ def router(console: Console, face: Face) -> APIRouter:
     @routes.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
         """Stop a mission that is approved or runs, and return whether there was one to stop."""
-        # Agents wait for a person even if the robot stands still for a moment between two missions.
-        stopping = console.stop(BY_FACE, only_moving=True, holds=True, always=True)
+        stopping = console.stop(BY_FACE, only_moving=True, holds=True)
         return {"stopping": stopping, "warning": bool(console.warning or console.used_elsewhere)}
 
     @routes.websocket("/api/face/live")

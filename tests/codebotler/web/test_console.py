@@ -35,6 +35,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console, Notifier
+from codebotler.web.hold_file import HOLD_POLL_SECONDS
 from codebotler.web.panes.instruction import examples
 from doubles import FakeRobot
 from server import Server
@@ -834,7 +835,8 @@ def test_stop_reaches_a_robot_that_connects(tmp_path: Path) -> None:
 def test_stop_reaches_a_mission_of_another_process(tmp_path: Path, *, only_moving: bool) -> None:
     with make_console(tmp_path, Simulated(WORLD)) as one, make_console(tmp_path) as other:
         assert not other.stop("a person", only_moving=True, holds=True), "nothing uses the robot"
-        assert not other.is_held
+        assert other.is_held, "agents wait for a person"
+        time.sleep(3 * HOLD_POLL_SECONDS)  # until the other process has heard this press
         begin_and_approve(one, FAR)
         wait_until(one, lambda view: view.is_running)
         time.sleep(0.05)  # file systems keep coarse times
