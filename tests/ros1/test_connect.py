@@ -48,7 +48,7 @@ def open_door(sim: Simulation) -> None:
     \"\"\"Open the door.\"\"\"
 """
 SAY = "skills: {say: {topic: /speech, type: std_msgs/String, message: {data: $message}}}"
-WAITS = Timeouts(patience=3.0, silence=1.5, longest=20.0)
+WAITS = Timeouts(silence=1.5, longest=20.0)
 BOTH = pytest.mark.parametrize("kind", ["ros1", "rosbridge"])
 
 
