@@ -78,6 +78,7 @@ class OwnRobot:
         self.failed_stop = ""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._running: asyncio.Task[Any] | None = None  # a method that cancelling ends
+        self._cancelled: asyncio.Task[Any] | None = None  # the last one that STOP has cancelled
 
     def _method(self, skill: str) -> Callable[..., Any] | None:
         """Return the method for a skill, or None. If there is no `get_all_rooms`, use `rooms` instead."""
@@ -158,8 +159,9 @@ class OwnRobot:
                 threading.Thread(target=self._call_stop, daemon=True).start()
         self.clock.stop()
         running, loop = self._running, self._loop
-        if running is not None and loop is not None:  # another press must not end its clean-up
-            loop.call_soon_threadsafe(lambda: running.cancelling() or running.cancel())
+        if running is not None and loop is not None and running is not self._cancelled:
+            self._cancelled = running  # another press must not end its clean-up
+            loop.call_soon_threadsafe(running.cancel)
         if not self._stop_returned.wait(STOP_SECONDS):
             self.failed_stop = f"{self.name}.stop failed: it took too long; {STOP_BY_HAND}"
 

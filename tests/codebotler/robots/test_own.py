@@ -254,6 +254,33 @@ def test_an_async_method_does_not_begin_after_a_stop(write: Write) -> None:
     assert not body.began
 
 
+def test_stop_cancels_a_method_that_cleans_up_after_a_time_limit_of_its_own(write: Write) -> None:
+    robot = write(
+        """
+    began, tries = threading.Event(), 0
+    def rooms(self): return ["hall"]
+    def stop(self): pass
+    async def go_to(self, location):
+        for _ in range(9):
+            try:
+                async with asyncio.timeout(0.01):
+                    self.tries += 1
+                    try: await asyncio.sleep(30)
+                    finally: self.began.set(); await asyncio.sleep(0.1)
+            except TimeoutError: pass
+"""
+    )
+    robot.connect()
+    body = robot._body  # type: ignore[attr-defined]  # of a class in a file
+    with ThreadPoolExecutor() as threads:
+        drive = threads.submit(robot.perform, "go_to", ["hall"])
+        assert body.began.wait(SOON)
+        robot.cancel()
+        with pytest.raises(CancelledError):
+            drive.result(SOON)
+    assert body.tries == 1
+
+
 @pytest.mark.parametrize("leaves", [False, True], ids=["stop", "disconnect"])
 def test_a_cancelled_method_counts_as_running_until_it_has_cleaned_up(write: Write, *, leaves: bool) -> None:
     robot = write(
