@@ -114,8 +114,8 @@ class CandidateClusters:
 def main_reason(rejected: Sequence[str]) -> str:
     """Return the most frequent of some problems: ` (2 of them: there is no lab)`; empty if there are none."""
     for problem, count in Counter(rejected).most_common(1):
-        share = "all" if count == len(rejected) else count
-        return f" ({f'{share} of them: ' * (len(rejected) > 1)}{shortened(problem)})"
+        some = f"{'all' if count == len(rejected) else count} of them: " * (len(rejected) > 1)
+        return f" ({some}{shortened(problem)})"
     return ""
 
 

@@ -37,10 +37,8 @@ def quote(text: str) -> str:
     if "\\" in text and '"' not in text and text.isprintable():
         # No regex ends with a single backslash, so the closing quote is safe.
         return f'r"{text}"'
-    if '"' in text:
-        return repr(text)
     # A single quote makes `repr` choose double ones.
-    return '"' + repr("'" + text)[2:]
+    return repr(text) if '"' in text else '"' + repr("'" + text)[2:]
 
 
 class Matcher(ABC):

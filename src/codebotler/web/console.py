@@ -93,6 +93,7 @@ class Console:
         self._lost: MissionSession | None = None  # whose robot may still move
         self._stopping = threading.Thread()  # sends a stop to that robot
         self._asking: StopButton | None = None  # of a robot that is asked where it is
+        self.was_stopped = False  # whether STOP was pressed since the start, also in another process
         self._began = 0.0  # the time at which the current session began
         self.used_elsewhere = ""  # a sentence about the process that used the robot at the last STOP
 
@@ -286,7 +287,7 @@ class Console:
         person must approve the next mission, even if there was nothing to stop.
         """
         with self._lock:
-            session, self._may_recover = self.session, None
+            session, self._may_recover, self.was_stopped = self.session, None, True
             lost = self._forget_loss()
             asking = self._asking
             is_active = asking is not None or (session is not None and not session.view.is_over)

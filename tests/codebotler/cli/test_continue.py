@@ -12,9 +12,11 @@ from typing import Any
 import pytest
 
 from codebotler.cli.operating.run import Request, run
+from codebotler.core.errors import UserError
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
 from codebotler.missions.storage.log import EVENTS_FILE, SUMMARY_FILE
+from codebotler.missions.storage.past import MissionPast
 from codebotler.missions.storage.store import read_missions
 from codebotler.robots.simulated import Simulated
 from codebotler.web.console import Console
@@ -48,6 +50,16 @@ AGAIN = """def task_program():
     pick("mug")
 """
 WIDER = REST.replace('"done"', '"All is well, and somebody else got it."')
+
+
+def test_nothing_begins_after_a_stop_while_a_person_was_asked(tmp_path: Path) -> None:
+    past = MissionPast("1", "Say it.", "", PROGRAM, "", ())
+    console = Console(Simulated(World((Room("hall"),), "hall")), tmp_path, lambda _: pytest.fail("no model"))
+    request = Request("Say it.", yes=True, past=past)
+    assert request.order_on(console).past is past
+    assert not console.stop("a person at the page", holds=True)
+    with pytest.raises(UserError):
+        request.order_on(console)
 
 
 @pytest.fixture

@@ -68,6 +68,8 @@ class Request:
     def order_on(self, console: Console) -> MissionOrder:
         """Return the mission to begin on the console. This reads the program file or standard input."""
         program = read_program(self.what) if self.is_program else ""
+        if console.was_stopped:  # while a person was asked what had happened
+            raise UserError("somebody pressed STOP, so nothing was begun; run this command again")
         if self.past is not None:
             return console.rest_of(self.past, program)
         return MissionOrder("" if program else self.what, program=program, asks=not self.yes)

@@ -94,9 +94,7 @@ def _past(verb: str) -> str:
 def _ing(verb: str) -> str:
     if verb.endswith("ie"):
         return f"{verb[:-2]}ying"
-    if re.search(r"[^eoy]e$", verb):
-        return f"{verb[:-1]}ing"
-    return f"{_doubled(verb)}ing"
+    return f"{verb[:-1]}ing" if re.search(r"[^eoy]e$", verb) else f"{_doubled(verb)}ing"
 
 
 def _doubled(verb: str) -> str:
