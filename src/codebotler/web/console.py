@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 import threading
 import time
-from collections.abc import AsyncGenerator, Callable, Sequence
-from contextlib import aclosing, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from hashlib import sha256
@@ -39,15 +38,11 @@ from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.pool import SHARED_POOL
 from codebotler.simulator.worlds.room_map import RoomMap
 from codebotler.web.hold_file import HoldFile
+from codebotler.web.notifier import Notifier
 
-MAX_PROGRAM_CHARACTERS = 200_000
-"""The maximum length of a program or an instruction."""
-
-MAX_WAIT_SECONDS = 15.0
-"""The longest time that a request waits for a change."""
-
-CLEANUP_SECONDS = 2.0
-"""The time limit for ending a mission if its program has not begun to run."""
+MAX_PROGRAM_CHARACTERS = 200_000  # the maximum length of a program or an instruction
+MAX_WAIT_SECONDS = 15.0  # the longest time that a request waits for a change
+CLEANUP_SECONDS = 2.0  # the time limit for ending a mission if its program has not begun to run
 
 
 class Console:
@@ -338,55 +333,6 @@ class Console:
         skills = self.robot.skills
         with self._checking:  # the check of a mission must not wait for those of many clients
             return check(program, room_map=room_map, house_rules=rules, skills=skills, explores=True)
-
-
-class Notifier:
-    """Wakes viewers after each change. They read the latest view, so no queue can build up."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._wakes: list[Callable[[], None]] = []
-        self.is_closed = False
-
-    def change(self) -> None:
-        """Wake all viewers, from any thread."""
-        with self._lock:
-            wakes = tuple(self._wakes)
-        for wake in wakes:
-            wake()
-
-    def close(self) -> None:
-        """End all loops over `changes`, because the server ends."""
-        self.is_closed = True
-        self.change()
-
-    async def changes(self) -> AsyncGenerator[None]:
-        """Yield now and after each change, until `close`. Changes in quick succession may count as one."""
-        loop, changed = asyncio.get_running_loop(), asyncio.Event()
-
-        def wake() -> None:
-            with suppress(RuntimeError):  # the event loop has ended
-                loop.call_soon_threadsafe(changed.set)
-
-        with self._lock:
-            self._wakes.append(wake)
-        try:
-            while not self.is_closed:
-                changed.clear()
-                yield
-                await changed.wait()
-        finally:
-            with self._lock:
-                self._wakes.remove(wake)
-
-    async def until(self, is_met: Callable[[], bool], seconds: float | None = None) -> bool:
-        """Wait until a condition is met, for at most `seconds` if given. Return whether it is met."""
-        with suppress(TimeoutError):
-            async with asyncio.timeout(seconds), aclosing(self.changes()) as changes:
-                async for _ in changes:
-                    if is_met():
-                        return True
-        return is_met()
 
 
 def is_version_of(program: str, changed: str) -> bool:

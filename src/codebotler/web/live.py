@@ -7,10 +7,9 @@ from collections.abc import Awaitable, Callable
 
 from nicegui import background_tasks, ui
 
-from codebotler.web.console import Notifier
+from codebotler.web.notifier import Notifier
 
-_UPDATE_PAUSE = 0.1
-"""The shortest time between two updates of a page, in seconds."""
+_UPDATE_PAUSE = 0.1  # the shortest time between two updates of a page, in seconds
 
 
 async def follow(notifier: Notifier, update: Callable[[], Awaitable[None]]) -> None:

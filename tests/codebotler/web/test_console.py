@@ -34,8 +34,9 @@ from codebotler.robots.base import CancelledError, NotReadyError, Robot, RobotLo
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import OFFICE, Simulated
 from codebotler.simulator.worlds.room_map import RoomMap
-from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console, Notifier
+from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
 from codebotler.web.hold_file import HOLD_POLL_SECONDS
+from codebotler.web.notifier import Notifier
 from codebotler.web.panes.instruction import examples
 from doubles import FakeRobot
 from server import Server

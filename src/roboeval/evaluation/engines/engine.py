@@ -31,7 +31,6 @@ class Engine(Protocol):
 
         `function` and `then` may run in other processes, so they and their results must be picklable.
         """
-        ...
 
 
 OpenEngine = AbstractContextManager[Engine]
