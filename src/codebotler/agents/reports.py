@@ -105,13 +105,12 @@ def approval_text(view: SessionView, robot: Robot, contract: str) -> str:
 
 def choice_text(asked: ClarifyingQuestion) -> str:
     """Return the text of the dialog to choose a behaviour, with numbered options."""
-    facts = f"Suppose that {listed([*map(shortened, asked.facts)])}." if asked.facts else ""
     options = (
         f"{number}. The robot {shortened(one.difference)} ({one.share})."
         for number, one in enumerate(asked.options, 1)
     )
     last = f'The answer "none" ends the mission: {asked.why_last}.' if asked.why_last else ""
-    return "\n".join(filter(None, ("Which did you mean?", facts, *options, asked.left_out, last)))
+    return "\n".join(filter(None, (f"Which did you mean?{asked.world}", *options, asked.left_out, last)))
 
 
 def _sendable(value: object) -> object:

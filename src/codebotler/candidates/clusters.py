@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 from codebotler.candidates.behaviour import (
     Behaviour,
@@ -17,7 +18,7 @@ from codebotler.candidates.behaviour import (
     wording,
 )
 from codebotler.checking.check import check_on
-from codebotler.checking.problems import Sample
+from codebotler.checking.problems import CheckResult, Sample
 from codebotler.checking.sampled import (
     CheckSettings,
     SampledRuns,
@@ -145,7 +146,7 @@ def cluster_candidates(
     rejected = tuple(f"{problem.kind}: {problem.message}" for problem in first)
     if not accepted:
         return CandidateClusters((CandidateCluster((programs[0],), 1, (), ()),), rejected[1:])
-    rooms = room_map or shared_rooms(accepted, [checks[one].room_map for one in accepted], settings)
+    rooms = room_map or shared_rooms(accepted, [checks[one] for one in accepted], settings)
     runs = run_in_shared_worlds(worker, [*accepted, *refused], rooms, settings)
     traces = [sample.outcome.trace for samples in runs for sample in samples]
     names, several = names_in((*rooms.rooms, *rooms.people), traces), rooms_with_several(traces)
@@ -202,19 +203,22 @@ def _cluster(
     return CandidateCluster(tuple(programs[number] for number in ordered), size, behaviours, samples)
 
 
-def shared_rooms(programs: Iterable[str], maps: Sequence[RoomMap], settings: CheckSettings) -> RoomMap:
+def shared_rooms(programs: Iterable[str], checks: Sequence[CheckResult], settings: CheckSettings) -> RoomMap:
     """Return one map of the rooms that any program names, without "office" if another is "ann's office".
 
     If a program lists the rooms, there are two of each kind, since a loop needs several rooms to go wrong.
     """
-    start = maps[0].start
-    named = dict.fromkeys(normalized(room) for one in maps for room in one.rooms if room != start)
+    start = checks[0].room_map.start
+    events = (event for one in checks for sample in one.samples for event in sample.outcome.trace)
+    visited = (event.destination for event in events if event.destination)  # their names may be computed
+    every = chain((room for one in checks for room in one.rooms), visited)
+    named = dict.fromkeys(normalized(room) for room in every if room != start)
     rooms = [room for room in named if not any(contains(other, room) for other in named if other != room)]
     if any(read_rooms(program, settings.skills)[1] for program in programs):
         kinds = Counter(ROOM_NUMBER.sub("", room) for room in rooms)
         second = {kind: f"{kind} 1" if f"{kind} 2" in rooms else f"{kind} 2" for kind in kinds}
         rooms += [second[kind] for kind, count in kinds.items() if count == 1]
-    return replace(maps[0], rooms=(*rooms, start), start=start)
+    return replace(checks[0].room_map, rooms=(*rooms, start), start=start)
 
 
 def run_in_shared_worlds(

@@ -6,9 +6,11 @@ import re
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple, TypeAlias
+from functools import partial, reduce
+from operator import and_
+from typing import Any, Literal, TypeAlias
 
-from codebotler.candidates.behaviour import PAPER_KINDS, Behaviour, statements
+from codebotler.candidates.behaviour import Behaviour, rooms_with_several
 from codebotler.candidates.clusters import (
     CandidateCluster,
     CandidateClusters,
@@ -18,7 +20,7 @@ from codebotler.candidates.clusters import (
 from codebotler.checking.problems import Sample
 from codebotler.checking.storyboard import steps_of
 from codebotler.core.errors import UserError
-from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE, SAY
+from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.terminal import shortened
 from codebotler.core.text.phrases import phrase
 from codebotler.core.text.words import brief, counted, elide_list, listed
@@ -40,19 +42,9 @@ NOTICED_KINDS = frozenset({SAY, ASK, PICK, PLACE})
 ClarifyingAnswer: TypeAlias = int | Literal["none", "decide"]
 """The position of an option from 0, `none` to reject them all, or `decide` to leave it to the tool."""
 
-Aspect: TypeAlias = tuple[str, str]
-"""A field of a `Behaviour` and the room or thing in question, such as `("said", "kitchen")`."""
 
-
-class WordLimits(NamedTuple):
-    """The limits for the description of an option."""
-
-    parts: int  # the most differences, texts, and rooms of a text
-    characters: int  # of a text
-
-
-BRIEF, WHOLE = WordLimits(4, 70), WordLimits(1_000, 4_000)
-"""The usual limits, and those for options whose brief descriptions are equal."""
+BRIEF, WHOLE = (4, 70), (1_000, 4_000)
+"""Limits for actions, rooms of an action, and characters; `WHOLE` if brief descriptions are equal."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +56,7 @@ class CandidateOption:
         size: the number of candidates that behave like it, in this world at least.
         steps: its steps in the world of the question, from `steps_of`.
         difference: only how it differs from the other options, such as "ends in kitchen".
+        own: the numbers of the steps that not all options share.
         share: how many candidates behave like it, and in how many worlds it waits without success, in words.
     """
 
@@ -71,6 +64,7 @@ class CandidateOption:
     size: int
     steps: tuple[Mapping[str, Any], ...] = field(repr=False)
     difference: str
+    own: frozenset[int] = frozenset()
     share: str = ""
 
 
@@ -104,9 +98,19 @@ class ClarifyingQuestion:
         return f"Not shown: {listed(parts)}." if parts else ""
 
     @property
+    def legend(self) -> str:
+        """A sentence about the marked steps of the options; empty if no step is marked."""
+        return "What differs is marked." * any(one.own for one in self.options)
+
+    @property
+    def world(self) -> str:
+        """The facts of the world, as in " Suppose that Anne is in the lab."; empty if there are none."""
+        return f" Suppose that {listed([*map(shortened, self.facts)])}." if self.facts else ""
+
+    @property
     def supposition(self) -> str:
         """The facts of the world, as in ", supposing that Anne is in the lab"; empty if there are none."""
-        return f", supposing that {listed([*map(shortened, self.facts)])}" if self.facts else ""
+        return self.world.replace(" Suppose", ", supposing", 1).removesuffix(".")
 
     @property
     def programs(self) -> tuple[str, ...]:
@@ -176,10 +180,11 @@ def question_about(
     samples = [one.samples[number] for one in shown]
     behaviours = [one.behaviours[number] for one in shown]
     options = []
-    for one, sample, words in zip(shown, samples, describe_differences(samples, behaviours), strict=True):
+    differences = describe_differences(samples, behaviours)
+    for one, sample, (words, own) in zip(shown, samples, differences, strict=True):
         behaviour, steps = one.behaviours[number], tuple(steps_of(sample.outcome.trace, has_places=True))
         size = sum(other.size for other in groups.clusters if other.behaviours[number] == behaviour)
-        options.append(CandidateOption(one.program, size, steps, words, _share(one, size, groups.total)))
+        options.append(CandidateOption(one.program, size, steps, words, own, _share(one, size, groups.total)))
     why_last = "this is the second question" if is_second else ""
     why_last = "a recorded model writes no new programs" if is_recorded(model) else why_last
     facts = _facts_that_matter(shown, number)
@@ -233,83 +238,77 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
     return tuple(elide_list(telling or facts(number), MAX_QUESTION_FACTS))
 
 
-def describe_differences(samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> list[str]:
-    """Return how each run in one world differs from the other runs, such as "ends in kitchen"."""
-    seen = [_aspects(behaviour) for behaviour in behaviours]
-    keys, said = _telling_first(seen), [behaviour.said for behaviour in behaviours]
-    rooms = {room for one in said for other in said for room, _ in one - other}  # where the options differ
+def describe_differences(
+    samples: Sequence[Sample], behaviours: Sequence[Behaviour]
+) -> list[tuple[str, frozenset[int]]]:
+    """Return how each run in one world differs from the others, in words and as the numbers of its own steps.
+
+    Such words are `ends in kitchen`. The own steps are those that not all runs share, numbered from 1.
+    """
+    said, traces = [one.said for one in behaviours], [one.outcome.trace for one in samples]
+    rooms = {room for one in said for other in said for room, _ in one - other}  # where statements differ
+    several = rooms_with_several(traces)
+    keys = [[_noticed(event, rooms, several) for event in trace] for trace in traces]
+    shared = reduce(and_, map(Counter, keys))
+    differ = {name for one in behaviours for name in one.differences(behaviours[0])}
+    apart = "room" in differ
+    drives = [[n for n, one in enumerate(trace, 1) if one.destination and apart] for trace in traces]
+    own = [_beyond(each, shared).union(some[-1:]) for each, some in zip(keys, drives, strict=True)]
     words: list[str] = []
     for limits in (BRIEF, WHOLE):
-        shown = sorted(keys[: limits.parts], key=lambda key: key[0] == "room")  # the last room at the end
-        words = [listed([_words(key, sample, rooms, limits) for key in shown]) for sample in samples]
+        words = [_words(one, each, differ, limits) for one, each in zip(samples, own, strict=True)]
         if len({*words}) == len(words):
             break
-    return words
+    return [*zip(words, own, strict=True)]
 
 
-def _telling_first(seen: Sequence[Mapping[Aspect, object]]) -> list[Aspect]:
-    """Return the aspects in which options differ, beginning with those that tell all of them apart."""
-
-    def kinds(*keys: Aspect) -> int:
-        return len({tuple(aspects.get(key) for key in keys) for aspects in seen})
-
-    differing = [key for key in dict.fromkeys(key for aspects in seen for key in aspects) if kinds(key) > 1]
-    telling: list[Aspect] = []
-    for key in sorted(differing, key=kinds, reverse=True):
-        if kinds(*telling, key) > kinds(*telling):
-            telling.append(key)
-    return [*dict.fromkeys([*telling, *differing])]
+def _noticed(event: Event, rooms: Container[str], several: Container[str]) -> tuple[object, ...]:
+    """Return what a person would notice of an event, as in a `Behaviour`; empty for drives and looks."""
+    if event.kind == ASK:
+        person = normalized(event.to or "") if event.place in several else ""
+        return ASK, event.place, person, *sorted(normalized(text) for text, _ in event.options)
+    is_hidden = event.kind in {GOTO, CHECK} or (event.kind == SAY and event.place not in rooms)
+    return () if is_hidden else (event.kind, event.place, normalized(event.text), *event.more)
 
 
-def _aspects(behaviour: Behaviour) -> dict[Aspect, object]:
-    """Return the parts of a behaviour that are described separately."""
-    parts: dict[Aspect, list[object]] = {("said", ""): [behaviour.said]}
-    for kind, thing, room in behaviour.moved:
-        parts.setdefault(("moved", thing), []).append((kind, room))
-    for room, options, person in behaviour.asked:
-        parts.setdefault(("asked", room), []).append((options, person))
-    rest = {("done", ""): behaviour.done, ("ending", ""): behaviour.ending, ("room", ""): behaviour.room}
-    return {**{key: frozenset(Counter(values).items()) for key, values in sorted(parts.items())}, **rest}
+def _beyond(keys: Sequence[tuple[object, ...]], shared: Mapping[tuple[object, ...], int]) -> frozenset[int]:
+    """Return the positions, from 1, of the keys that occur more often than in `shared`."""
+    seen = Counter[tuple[object, ...]]()
+    own = set[int]()
+    for number, key in enumerate(keys, 1):
+        seen[key] += 1
+        if key and seen[key] > shared[key]:
+            own.add(number)
+    return frozenset(own)
 
 
-def _words(key: Aspect, sample: Sample, rooms: Container[str], limits: WordLimits) -> str:
-    """Describe an aspect of a run. Of what it says, only what it says in these `rooms`, if anything."""
-    kind, name = key
+def _words(sample: Sample, own: Container[int], differ: Container[str], limits: tuple[int, int]) -> str:
+    """Describe the own steps of a run, or all that it does if it has none, and how and where it ends."""
     outcome = sample.outcome
-    if kind == "said":
-        said = [*statements(outcome.trace)]
-        telling = [one for one in said if one[0] in rooms]
-        return f"{'only ' * bool(said and not telling)}says {_speech(telling or said, limits)}"
-    if kind == "moved":
-        moves = (one for one in outcome.trace if one.kind in {PICK, PLACE} and normalized(one.text) == name)
-        return _events(moves, f'leaves "{name.replace(chr(34), chr(39))}" alone')
-    if kind == "asked":
-        return _events(
-            (one for one in outcome.trace if one.kind == ASK and one.place == name), f"asks nobody in {name}"
-        )
-    if kind == "room":
-        rooms = [one.destination for one in outcome.trace if one.kind == GOTO and one.destination is not None]
-        ends = "ends" if outcome.error is None else "is then"
-        return f"{ends} in {rooms[-1]}" if rooms else "stays where it is"
-    if kind == "ending":
-        return "finishes" if outcome.error is None else f"does not finish: {brief(outcome.error.message)}"
-    return _events((one for one in outcome.trace if one.kind not in PAPER_KINDS), "does nothing else")
+    own_events = [one for number, one in enumerate(outcome.trace, 1) if number in own]
+    parts, error = _acts([one for one in own_events if one.kind != GOTO], limits), outcome.error
+    if "ending" in differ and error is not None:
+        parts.append(f"does not finish: {brief(error.message)}")
+    if "room" in differ:
+        ends = "ends" if error is None else "is then"
+        drives = [f"{ends} in {one.destination}" for one in own_events if one.kind == GOTO]
+        parts += drives or ["stays where it is"]
+    if parts:
+        return listed(parts)
+    acts = [one for one in outcome.trace if one.kind not in {GOTO, CHECK}]
+    return f"only {listed(_acts(acts, limits))}" if acts else "does nothing"
 
 
-def _speech(said: Iterable[tuple[str, str]], limits: WordLimits) -> str:
-    rooms: dict[str, list[str]] = {}  # of each text
-    for room, text in ((room, text) for room, texts in said for text in texts.splitlines()):
-        rooms.setdefault(brief(text, limits.characters).replace('"', "'"), []).append(room)
-    words = [
-        f'"{text}" in {listed(elide_list([*dict.fromkeys(some)], limits.parts))}'
-        for text, some in rooms.items()
-    ]
-    return listed(elide_list(words, limits.parts)) or "nothing"
-
-
-def _events(events: Iterable[Event], nothing: str) -> str:
-    words = Counter(
-        phrase(one, "third") + (f' to "{brief(one.to)}"' if one.to else "") + f" in {one.place}"
-        for one in events
-    )
-    return listed([f"{one} {count} times" if count > 1 else one for one, count in words.items()]) or nothing
+def _acts(events: Iterable[Event], limits: tuple[int, int]) -> list[str]:
+    """Describe actions, each with the rooms where it occurs: `says "Lunch!" in lab and den`."""
+    most, characters = limits
+    rooms: dict[str, Counter[str]] = {}  # of each phrase
+    for one in events:
+        words = phrase(one, "third", show=partial(brief, most=characters))
+        words += f' of "{brief(one.to)}"' if one.to else ""
+        rooms.setdefault(words, Counter())[one.place] += 1
+    found = []
+    for words, counts in rooms.items():
+        places = [f"{room} {count} times" if count > 1 else room for room, count in counts.items()]
+        found.append(f"{words} in {listed(elide_list(places, most))}")
+    return elide_list(found, most)

@@ -116,17 +116,17 @@ def _spoken(texts: Iterable[str]) -> list[str]:
 
 def draw_scene(
     scene: Scene,
-    wrong: Container[int] = frozenset(),
+    marked: Container[int] = frozenset(),
     *,
     mark: str = "",
     anchor: str = "",
 ) -> None:
-    """Draw one visit to a room. `wrong` holds the numbers of steps to draw in red.
+    """Draw one visit to a room. `marked` holds the numbers of steps to highlight.
 
     `mark` is a key of `SCENE_MARKS`, or "". With the anchor `s`, for example, step 2 gets the HTML ID `s2`.
     """
     kinds = ["scene"] if scene.deeds or not scene.is_found else ["scene", "passing"]
-    kinds += ["wrong"] * (scene.step in wrong) + [mark] * bool(mark)
+    kinds += ["marked"] * (scene.step in marked) + [mark] * bool(mark)
     with ui.element("li").classes(" ".join(kinds)):
         _number(PlainText("b", scene.room, "room"), scene.step, anchor)
         if mark:
@@ -136,7 +136,7 @@ def draw_scene(
             PlainText("span", "there is no such room", "deed missing")
         for deed in scene.deeds:
             look = f"deed deed-{deed.kind}" if deed.kind == ANSWER or is_spoken(deed.kind) else "deed"
-            shown = PlainText("span", deed.text, f"{look} wrong" if deed.step in wrong else look)
+            shown = PlainText("span", deed.text, f"{look} marked" if deed.step in marked else look)
             _number(shown, deed.step, anchor)
             if deed.is_repeated:
                 PlainText("span", "done already, would happen again", "repeated")

@@ -13,6 +13,7 @@ from codebotler.candidates.clusters import (
     shared_rooms,
 )
 from codebotler.candidates.question import question_about
+from codebotler.checking.problems import CheckResult
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.rtl import parse
@@ -160,11 +161,20 @@ def test_without_a_map_all_programs_share_the_rooms_that_they_name(worker: Worke
     assert sorted(one.size for one in found.clusters) == [1, 2]
 
 
+def test_without_a_map_rooms_with_computed_names_are_shared_too(worker: Worker) -> None:
+    computes = 'def task_program():\n    for n in (1, 2):\n        go_to(f"conference room {n}")\n'
+    lists = "def task_program():\n    for one in get_all_rooms():\n"
+    lists += "        if 'conference room' in one:\n            go_to(one)\n"
+    (found,) = cluster(worker, computes, lists, rooms=None).clusters
+    assert found.size == 2
+
+
 def test_a_program_that_lists_rooms_gets_two_of_each_kind() -> None:
     lists = "def task_program():\n    for room in get_all_rooms():\n        go_to(room)\n"
-    maps = [RoomMap(rooms, "start_loc") for rooms in (("office", "start_loc"), ("the lab 1", "lab"))]
-    alone = shared_rooms(["def task_program():\n    pass"], maps, CheckSettings())
+    rooms = ("office", "start_loc"), ("the lab 1", "lab")
+    checks = [CheckResult((), (), RoomMap(one, "start_loc")) for one in rooms]
+    alone = shared_rooms(["def task_program():\n    pass"], checks, CheckSettings())
     assert alone.rooms == ("office", "lab 1", "start_loc")
-    both = shared_rooms([lists], maps, CheckSettings())
+    both = shared_rooms([lists], checks, CheckSettings())
     assert both.rooms == ("office", "lab 1", "office 2", "lab 2", "start_loc")
     assert both.start == "start_loc"

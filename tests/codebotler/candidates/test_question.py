@@ -162,25 +162,51 @@ def test_options_show_their_steps_in_the_world() -> None:
     assert [(step["kind"], step["text"]) for step in first.steps] == [("say", "1 mugs")]
 
 
-def describe(*traces: Trace) -> list[str]:
+def differences_of(*traces: Trace) -> list[tuple[str, frozenset[int]]]:
     made = [cluster(1, "a", trace) for trace in traces]
     return describe_differences([one.samples[0] for one in made], [one.behaviours[0] for one in made])
+
+
+def describe(*traces: Trace) -> list[str]:
+    return [words for words, _ in differences_of(*traces)]
 
 
 def test_sentences_describe_only_differences() -> None:
     greets = drive("hall", "lab"), say("Hello", "lab"), drive("lab", "hall")
     assert describe((*greets, *ONE), greets) == ['says "1 mugs" in hall', 'only says "Hello" in lab']
     assert describe((drive("hall", "lab"),), ()) == ["ends in lab", "stays where it is"]
-    both = ['says "1 mugs" in hall and ends in lab', "says nothing and stays where it is"]
+    both = ['says "1 mugs" in hall and ends in lab', "stays where it is"]
     assert describe((drive("hall", "lab"), *ONE), ()) == both
+    assert [own for _, own in differences_of((drive("hall", "lab"), *ONE), ())] == [{1, 2}, set()]
+    assert describe(ONE, ()) == ['says "1 mugs" in hall', "does nothing"]
+
+
+def test_steps_that_all_options_share_are_not_their_own() -> None:
+    asks = Event("ask", "Tea?", options=(Option("yes"), Option("no")), answer="no", to="Ann", place="lab")
+    picks = Event("pick", "mug", place="lab")
+    look = Event("check", "mug", found=True, place="lab")
+    (asked, own), (rest, none) = differences_of((look, picks, asks, picks, say("Bye")), (picks, say("Bye")))
+    assert (own, none) == (frozenset({3, 4}), frozenset[int]())
+    assert asked == 'asks "Tea?" [yes | no] of "Ann" in lab and picks up "mug" in lab'
+    assert rest == 'only picks up "mug" in lab and says "Bye" in hall'
+
+
+def test_questions_with_other_options_or_of_other_people_are_own_steps() -> None:
+    ask = Event("ask", "Tea?", options=(Option("yes"),), answer="yes", to="Ann", place="lab")
+    other_words, other_option = replace(ask, text="Some tea?"), replace(ask, options=(Option("no"),))
+    assert [own for _, own in differences_of((ask, say("1 mugs")), (other_words, say("2 mugs")))] == [
+        {2},
+        {2},
+    ]
+    for other in (other_option, replace(ask, to="Bob")):
+        assert [own for _, own in differences_of((ask,), (other,))] == [{1}, {1}]
 
 
 def test_sentence_quotes_each_utterance_and_counts_equal_steps() -> None:
     picks = Event("pick", "mug", place="lab"), Event("place", "mug", place="hall")
     two, none = describe((say("Hi"), say("Bye"), *picks, *picks), ())
-    assert 'says "Hi" in hall and "Bye" in hall' in two
-    assert 'picks up "mug" in lab 2 times' in two
-    assert "says nothing" in none
+    assert two.startswith('says "Hi" in hall, says "Bye" in hall, picks up "mug" in lab 2 times')
+    assert none == "does nothing"
 
 
 def test_texts_that_differ_late_are_shown_whole() -> None:
@@ -211,9 +237,12 @@ def test_sentence_names_what_is_said_and_where() -> None:
     first, second, silent = describe((say("Lunch!"),), (say("Lunch!"), *everywhere), (drive("hall", "lab"),))
     assert first == 'says "Lunch!" in hall and stays where it is'
     assert second == 'says "Lunch!" in hall, lab, den, attic and 2 more and ends in study'
-    assert silent == "says nothing and ends in lab"
-    only, _ = describe((say("Lunch!"), *everywhere[:2]), (say("Lunch!"), *everywhere[:2], *everywhere[8:]))
-    assert only.startswith('only says "Lunch!" in hall and lab')
+    assert silent == "ends in lab"
+    back = drive("study", "lab")
+    only, _ = describe(
+        (say("Lunch!"), *everywhere[:2]), (say("Lunch!"), *everywhere[:2], *everywhere[8:], back)
+    )
+    assert only == 'only says "Lunch!" in hall and lab'
 
 
 def test_sentences_of_three_options_tell_all_of_them_apart() -> None:

@@ -17,7 +17,7 @@ from codebotler.checking.sampled import CheckSettings
 from codebotler.checking.storyboard import storyboard
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import busy, console, note, print_source, shortened, visible
-from codebotler.core.text.words import brief, listed, with_sentence
+from codebotler.core.text.words import brief, with_sentence
 from codebotler.generation.generate import Attempt, gather_candidates, write_checked_program
 from codebotler.generation.no_program import ProgramlessReply
 from codebotler.models.base import Model
@@ -158,12 +158,12 @@ def print_checked(program: str, settings: CheckSettings, room_map: RoomMap | Non
 
 def question_view(question: ClarifyingQuestion) -> RenderableType:
     """Return a question for printing: the facts of the imagined world, and a storyboard for each option."""
-    facts = f"Suppose that {listed([*map(shortened, question.facts)])}." if question.facts else ""
-    parts: list[RenderableType] = [Text("Which did you mean?", "bold"), *([Text(facts)] if facts else [])]
+    facts = f"{question.legend}{question.world}"
+    parts: list[RenderableType] = [Text("Which did you mean?", "bold"), Text(facts)]
     for number, option in enumerate(question.options, 1):
         head = f"{number}: {visible(option.difference)}"
         parts += [Text(), Text.assemble((head, "bold"), (f"  ({option.share})", "dim"))]
-        parts.append(Padding(storyboard(option.steps, set()), (0, 0, 0, 2)))
+        parts.append(Padding(storyboard(option.steps, option.own), (0, 0, 0, 2)))
     if question.left_out:
         parts += [Text(), Text(question.left_out, "dim")]
     last = f'The answer "none" gives up: {question.why_last}.\n' if question.why_last else ""

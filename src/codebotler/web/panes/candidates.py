@@ -8,7 +8,6 @@ from nicegui import ui
 
 from codebotler.candidates.question import CandidateOption, ClarifyingAnswer, ClarifyingQuestion
 from codebotler.core.terminal import shortened
-from codebotler.core.text.words import listed
 from codebotler.missions.display.view import SessionView
 from codebotler.missions.display.wording import capitalize
 from codebotler.web.console import Console
@@ -32,9 +31,7 @@ class CandidatesPane:
 
     def _draw(self, question: ClarifyingQuestion) -> None:
         PlainText("h3", "Which did you mean?")
-        if question.facts:
-            facts = listed([*map(shortened, question.facts)])
-            PlainText("p", f"The programs differ. Suppose that {facts}:", "world")
+        PlainText("p", f"{question.legend}{question.world}", "world")
         with ui.element("div").classes("cards"):
             for number, option in enumerate(question.options):
                 with ui.element("article").classes("card"):
@@ -55,8 +52,8 @@ class CandidatesPane:
         PlainText("small", option.share, "quiet")
         if option.steps:
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
-                for scene in scenes(option.steps, option.steps[0]["place"]):
-                    draw_scene(scene)
+                for scene in scenes(option.steps, option.steps[0]["place"], option.own):
+                    draw_scene(scene, option.own)
         else:
             PlainText("p", "The robot does nothing.")
         button = Button("This one", lambda: self._answer(number), "go")
