@@ -110,7 +110,8 @@ def choice_text(asked: ClarifyingQuestion) -> str:
         for number, one in enumerate(asked.options, 1)
     )
     last = f'The answer "none" ends the mission: {asked.why_last}.' if asked.why_last else ""
-    return "\n".join(filter(None, (f"Which did you mean?{asked.world}", *options, asked.left_out, last)))
+    first = f"Which did you mean{asked.supposition}?"
+    return "\n".join(filter(None, (first, *options, asked.left_out, last)))
 
 
 def _sendable(value: object) -> object:

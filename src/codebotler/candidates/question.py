@@ -27,7 +27,7 @@ from codebotler.core.text.words import brief, counted, elide_list, listed
 from codebotler.core.trace import Event
 from codebotler.models.recorded import is_recorded
 from codebotler.simulator.worlds.matching import normalized
-from codebotler.simulator.worlds.sampled_facts import ANSWER_FORM
+from codebotler.simulator.worlds.sampled_facts import ANSWER_FORM, SampledFact
 
 DOMINANT_SHARE = 0.75
 """The largest cluster is taken without a question if it has at least this share of the candidates."""
@@ -73,11 +73,12 @@ class ClarifyingQuestion:
     """A question about which of a few behaviours a person meant.
 
     Args:
-        options: two or three options with different behaviours, beginning with the most frequent one.
+        options: two or three options with different behaviours: those that finish, then the most frequent.
         facts: the facts of the imagined world that explain the differences, in words.
         total: the number of accepted candidates.
         sample: the number of the imagined world.
         rejected: for each candidate that the check rejected, the first problem.
+        unwanted: the number of accepted candidates that behave like a refused program.
         why_last: why no new programs are written after the answer `none`; empty if some are.
     """
 
@@ -86,31 +87,31 @@ class ClarifyingQuestion:
     total: int
     sample: int
     rejected: tuple[str, ...] = ()
+    unwanted: int = 0
     why_last: str = ""
 
     @property
     def left_out(self) -> str:
         """A sentence about missing candidates: "Not shown: 2 programs that ..."; empty if none is missing."""
-        some, left = self.rejected, self.total - sum(one.size for one in self.options)
-        parts = [f"{counted(left, 'program')} that would do something else"] if left else []
-        rejected = f"{counted(len(some), 'program')} that the check rejects{main_reason(some)}"
-        parts += [rejected] if some else []
+        left, rejected = self.total - sum(one.size for one in self.options), len(self.rejected)
+        reasons = {
+            "that would do something else": left,
+            f"that the check rejects{main_reason(self.rejected)}": rejected,
+            "that would do what was not meant": self.unwanted,
+        }
+        parts = [f"{counted(number, 'program')} {why}" for why, number in reasons.items() if number]
         return f"Not shown: {listed(parts)}." if parts else ""
 
     @property
     def legend(self) -> str:
-        """A sentence about the marked steps of the options; empty if no step is marked."""
-        return "What differs is marked." * any(one.own for one in self.options)
-
-    @property
-    def world(self) -> str:
-        """The facts of the world, as in " Suppose that Anne is in the lab."; empty if there are none."""
-        return f" Suppose that {listed([*map(shortened, self.facts)])}." if self.facts else ""
+        """A line above the options: "The programs differ as marked, supposing that Anne is in the lab:"."""
+        marked = " as marked" * any(one.own for one in self.options)
+        return f"The programs differ{marked}{self.supposition}:"
 
     @property
     def supposition(self) -> str:
         """The facts of the world, as in ", supposing that Anne is in the lab"; empty if there are none."""
-        return self.world.replace(" Suppose", ", supposing", 1).removesuffix(".")
+        return f", supposing that {listed([*map(shortened, self.facts)])}" if self.facts else ""
 
     @property
     def programs(self) -> tuple[str, ...]:
@@ -177,6 +178,7 @@ def question_about(
     worlds = [number for number, count in conflicts.items() if count == min(conflicts.values())]
     number = max(worlds, key=lambda one: _rank(_distinct_clusters(groups.clusters, one), one))
     shown = _distinct_clusters(groups.clusters, number)
+    shown.sort(key=lambda one: bool(one.behaviours[number].ending))  # those that finish come first
     samples = [one.samples[number] for one in shown]
     behaviours = [one.behaviours[number] for one in shown]
     options = []
@@ -188,7 +190,8 @@ def question_about(
     why_last = "this is the second question" if is_second else ""
     why_last = "a recorded model writes no new programs" if is_recorded(model) else why_last
     facts = _facts_that_matter(shown, number)
-    return ClarifyingQuestion(tuple(options), facts, groups.total, number, groups.rejected, why_last)
+    left_out = groups.rejected, groups.unwanted
+    return ClarifyingQuestion(tuple(options), facts, groups.total, number, *left_out, why_last)
 
 
 def _share(shown: CandidateCluster, size: int, total: int) -> str:
@@ -225,17 +228,25 @@ def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, ...]:
 def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[str, ...]:
     """Return the facts of a world that do not hold in all worlds where the options look the same."""
 
-    def facts(world: int) -> list[str]:
-        drawn = dict.fromkeys(fact for one in shown for fact in one.samples[world].facts if fact.is_random)
+    def facts(world: int) -> list[SampledFact]:
+        random = ((fact for fact in one.samples[world].facts if fact.is_random) for one in shown)
+        drawn = Counter(fact for some in random for fact in dict.fromkeys(some))
         asked = Counter(fact.names[:-1] for fact in drawn if fact.form == ANSWER_FORM)
         # The steps of each option show its answer, if options get different answers to the same words.
         kept = [one for one in drawn if one.form != ANSWER_FORM or asked[one.names[:-1]] == 1]
-        return sorted((one.sentence for one in kept), key=lambda one: bool(ABSENCE.search(one)))
+        # What only some options find out explains best why they differ.
+        return sorted(kept, key=lambda one: (drawn[one] == len(shown), bool(ABSENCE.search(one.sentence))))
 
     same = [world for world in range(len(shown[0].samples)) if len({o.behaviours[world] for o in shown}) == 1]
     alike = [set(facts(world)) for world in same]
     telling = [fact for fact in facts(number) if not alike or not all(fact in one for one in alike)]
-    return tuple(elide_list(telling or facts(number), MAX_QUESTION_FACTS))
+    rooms: dict[str, list[str]] = {}  # of each person or thing that is in several ones
+    for one in telling or facts(number):
+        is_in = one.form.endswith(' in "{}"')
+        what, _, room = one.sentence.rpartition(' "') if is_in else (one.sentence, "", "")
+        rooms.setdefault(what, []).append(f'"{room}' * is_in)
+    sentences = [f"{what} {listed(some)}".rstrip() for what, some in rooms.items()]
+    return tuple(elide_list(sentences, MAX_QUESTION_FACTS))
 
 
 def describe_differences(
@@ -249,11 +260,15 @@ def describe_differences(
     rooms = {room for one in said for other in said for room, _ in one - other}  # where statements differ
     several = rooms_with_several(traces)
     keys = [[_noticed(event, rooms, several) for event in trace] for trace in traces]
+    for some, trace in zip(keys, traces, strict=True):
+        for last in [number for number, one in enumerate(trace) if one.destination is not None][-1:]:
+            some[last] = GOTO, trace[last].destination
     shared = reduce(and_, map(Counter, keys))
+    own = [
+        frozenset(n for n, key in enumerate(some, 1) if key and some[:n].count(key) > shared[key])
+        for some in keys
+    ]
     differ = {name for one in behaviours for name in one.differences(behaviours[0])}
-    apart = "room" in differ
-    drives = [[n for n, one in enumerate(trace, 1) if one.destination and apart] for trace in traces]
-    own = [_beyond(each, shared).union(some[-1:]) for each, some in zip(keys, drives, strict=True)]
     words: list[str] = []
     for limits in (BRIEF, WHOLE):
         words = [_words(one, each, differ, limits) for one, each in zip(samples, own, strict=True)]
@@ -271,44 +286,36 @@ def _noticed(event: Event, rooms: Container[str], several: Container[str]) -> tu
     return () if is_hidden else (event.kind, event.place, normalized(event.text), *event.more)
 
 
-def _beyond(keys: Sequence[tuple[object, ...]], shared: Mapping[tuple[object, ...], int]) -> frozenset[int]:
-    """Return the positions, from 1, of the keys that occur more often than in `shared`."""
-    seen = Counter[tuple[object, ...]]()
-    own = set[int]()
-    for number, key in enumerate(keys, 1):
-        seen[key] += 1
-        if key and seen[key] > shared[key]:
-            own.add(number)
-    return frozenset(own)
-
-
 def _words(sample: Sample, own: Container[int], differ: Container[str], limits: tuple[int, int]) -> str:
     """Describe the own steps of a run, or all that it does if it has none, and how and where it ends."""
     outcome = sample.outcome
     own_events = [one for number, one in enumerate(outcome.trace, 1) if number in own]
-    parts, error = _acts([one for one in own_events if one.kind != GOTO], limits), outcome.error
+    others = {_act(one, limits) for number, one in enumerate(outcome.trace, 1) if number not in own}
+    parts, error = _acts([one for one in own_events if one.kind != GOTO], limits, others), outcome.error
     if "ending" in differ and error is not None:
         parts.append(f"does not finish: {brief(error.message)}")
     if "room" in differ:
         ends = "ends" if error is None else "is then"
-        drives = [f"{ends} in {one.destination}" for one in own_events if one.kind == GOTO]
-        parts += drives or ["stays where it is"]
+        drives = [f"{ends} in {one.destination}" for one in outcome.trace if one.destination is not None]
+        parts += drives[-1:] or ["stays where it is"]
     if parts:
         return listed(parts)
     acts = [one for one in outcome.trace if one.kind not in {GOTO, CHECK}]
     return f"only {listed(_acts(acts, limits))}" if acts else "does nothing"
 
 
-def _acts(events: Iterable[Event], limits: tuple[int, int]) -> list[str]:
-    """Describe actions, each with the rooms where it occurs: `says "Lunch!" in lab and den`."""
-    most, characters = limits
+def _acts(events: Iterable[Event], limits: tuple[int, int], others: Container[str] = ()) -> list[str]:
+    """Describe actions, each with its rooms: `says "Lunch!" in lab and den`, after `also` if in `others`."""
     rooms: dict[str, Counter[str]] = {}  # of each phrase
     for one in events:
-        words = phrase(one, "third", show=partial(brief, most=characters))
-        words += f' of "{brief(one.to)}"' if one.to else ""
-        rooms.setdefault(words, Counter())[one.place] += 1
+        rooms.setdefault(_act(one, limits), Counter())[one.place] += 1
     found = []
     for words, counts in rooms.items():
         places = [f"{room} {count} times" if count > 1 else room for room, count in counts.items()]
-        found.append(f"{words} in {listed(elide_list(places, most))}")
-    return elide_list(found, most)
+        found.append(f"{'also ' * (words in others)}{words} in {listed(elide_list(places, limits[0]))}")
+    return elide_list(found, limits[0])
+
+
+def _act(event: Event, limits: tuple[int, int]) -> str:
+    person = f' of "{brief(event.to)}"' if event.to else ""
+    return phrase(event, "third", show=partial(brief, most=limits[1])) + person

@@ -94,7 +94,7 @@ def ask_evidence(
     """
     before = [past.last_position_text] if past.last_position_text else []
     if is_resumable(robot):  # it knows no more than the log
-        return [*before, "A simulated robot cannot say. If the step happened, the robot will not repeat it."]
+        return [*before, "A simulated robot cannot say, so your answer decides what it goes on with."]
     try:
         attach = partial(stop_button.attach, robot)
         with Reservation(robot, home, attach):

@@ -163,9 +163,9 @@ def strips(check: CheckResult) -> list[Strip]:
 def _strip(sample: Sample, check: CheckResult) -> Strip:
     error = sample.outcome.error
     is_harmless = sample.in_vain and sample.number not in check.evidence
-    if is_harmless:
-        why = "waits" if error is None or error.kind == "TimeoutError" else shortened(error.message)
-        ending = f"Ends without success ({why}), which does not count as a problem in this world."
+    if is_harmless and error is not None:
+        end = "Does not end" if error.kind == "TimeoutError" else "Ends without success"
+        ending = f"{end} ({shortened(error.message)}), which does not count as a problem in this world."
     elif error is not None:
         ending = f"Fails: {shortened(error.message, _MAX_STEP_TEXT)} ({shortened(error.kind)})"
     else:

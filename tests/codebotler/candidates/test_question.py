@@ -67,11 +67,12 @@ def test_question_offers_at_most_the_three_largest_options() -> None:
     assert "1 program " in question.left_out
     assert not ask_about(cluster(2, "a", ONE), cluster(1, "b", TWO)).left_out
     clusters = CandidateClusters(
-        (cluster(2, "a", ONE), cluster(1, "b", TWO)), rejected=("no lab", "no hall", "no lab")
+        (cluster(2, "a", ONE), cluster(1, "b", TWO)), rejected=("no lab", "no hall", "no lab"), unwanted=4
     )
     rest = question_about(clusters)
     assert rest is not None
     assert "3 programs that the check rejects (2 of them: no lab)" in rest.left_out
+    assert "4 programs that would do what was not meant" in rest.left_out
 
 
 def test_an_option_that_waits_without_success_says_so() -> None:
@@ -109,6 +110,22 @@ def test_options_that_are_alike_in_the_world_are_told_apart_from_others() -> Non
     assert ["1 other " in one.share for one in question.options] == [True, False]
     assert [one.size for one in question.options] == [4, 2]
     assert "something else" not in question.left_out
+
+
+def test_options_that_finish_come_first() -> None:
+    waits, ends = cluster(3, "waits", ONE), cluster(2, "ends", TWO)
+    behaviour = replace(waits.behaviours[0], ending="waits")
+    question = ask_about(replace(waits, behaviours=(behaviour,)), ends)
+    assert [one.program for one in question.options] == ["ends", "waits"]
+
+
+def test_rooms_of_the_same_thing_are_one_fact_and_what_only_some_options_learn_comes_first() -> None:
+    mug, too = (whereabouts("mug", room, is_there=True) for room in ("lab", "den"))
+    pen, no_cup = whereabouts("pen", "lab", is_there=True), whereabouts("cup", "den", is_there=False)
+    one, other = cluster(1, "a", ONE), cluster(1, "b", TWO)
+    one = replace(one, samples=(replace(one.samples[0], facts=(mug, pen, too)),))
+    other = replace(other, samples=(replace(other.samples[0], facts=(mug, pen, too, no_cup)),))
+    assert ask_about(one, other).facts == (no_cup.sentence, '"mug" is in "lab" and "den"', pen.sentence)
 
 
 def test_facts_that_hold_come_first() -> None:
@@ -187,8 +204,14 @@ def test_steps_that_all_options_share_are_not_their_own() -> None:
     look = Event("check", "mug", found=True, place="lab")
     (asked, own), (rest, none) = differences_of((look, picks, asks, picks, say("Bye")), (picks, say("Bye")))
     assert (own, none) == (frozenset({3, 4}), frozenset[int]())
-    assert asked == 'asks "Tea?" [yes | no] of "Ann" in lab and picks up "mug" in lab'
+    assert asked == 'asks "Tea?" [yes | no] of "Ann" in lab and also picks up "mug" in lab'
     assert rest == 'only picks up "mug" in lab and says "Bye" in hall'
+
+
+def test_more_of_what_all_options_do_is_said_after_also() -> None:
+    shared = drive("hall", "lab"), say("1 mug", "lab")
+    more = drive("lab", "den"), say("1 mug", "den"), drive("den", "lab")
+    assert describe((*shared, *more), shared) == ['also says "1 mug" in den', 'only says "1 mug" in lab']
 
 
 def test_questions_with_other_options_or_of_other_people_are_own_steps() -> None:

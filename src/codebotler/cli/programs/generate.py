@@ -158,8 +158,7 @@ def print_checked(program: str, settings: CheckSettings, room_map: RoomMap | Non
 
 def question_view(question: ClarifyingQuestion) -> RenderableType:
     """Return a question for printing: the facts of the imagined world, and a storyboard for each option."""
-    facts = f"{question.legend}{question.world}"
-    parts: list[RenderableType] = [Text("Which did you mean?", "bold"), Text(facts)]
+    parts: list[RenderableType] = [Text("Which did you mean?", "bold"), Text(question.legend)]
     for number, option in enumerate(question.options, 1):
         head = f"{number}: {visible(option.difference)}"
         parts += [Text(), Text.assemble((head, "bold"), (f"  ({option.share})", "dim"))]

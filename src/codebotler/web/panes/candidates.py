@@ -31,7 +31,7 @@ class CandidatesPane:
 
     def _draw(self, question: ClarifyingQuestion) -> None:
         PlainText("h3", "Which did you mean?")
-        PlainText("p", f"{question.legend}{question.world}", "world")
+        PlainText("p", question.legend, "world")
         with ui.element("div").classes("cards"):
             for number, option in enumerate(question.options):
                 with ui.element("article").classes("card"):

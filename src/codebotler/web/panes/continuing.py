@@ -107,7 +107,7 @@ def can_be_continued(summary: MissionSummary) -> bool:
 
 def draw_past(past: MissionPast) -> None:
     """Draw the steps of the earlier mission `past`, which the current mission continues."""
-    PlainText("h3", "Done so far")
+    PlainText("h3", "Done before this program")
     steps = [*zip(past.steps, past.trace, strict=True)]
     if earlier := steps[-_MAX_STEPS:-MAX_OPEN_STEPS]:
         with html.details():
