@@ -33,7 +33,7 @@ class Usage:
 
 @dataclass(frozen=True)
 class Reply:
-    """A model's reply to a prompt, and the program that was extracted from it."""
+    """A model's reply: its text, the program extracted from it, its token counts, and why it ended."""
 
     text: str = field(repr=False)  # the complete reply with tool calls, or the message of a refusal
     program: str = field(repr=False)  # the program in the reply; it may not parse
@@ -95,7 +95,7 @@ class Model(Protocol):
 
     @property
     def name(self) -> str:
-        """The name on the command line and in runs, such as `openai-chat:gpt-5.1`."""
+        """The model's name on the command line and in runs, such as `openai-chat:gpt-5.1`."""
 
     @property
     def settings(self) -> SamplingSettings:
