@@ -347,7 +347,7 @@ def check_answer(skill: Skill, result: base.RobotResult) -> base.RobotResult:
     """Return a robot's result for a skill unchanged, or raise RobotLostError if its type is wrong."""
     if not skill.returns.fits(result):
         raise RobotLostError(
-            f"the robot returned {result!r:.100} from {skill.name}, which must return "
+            f"the robot answered {skill.name} with {result!r:.100}, which is not of the type "
             f"{skill.returns.annotation}; correct the robot's driver"
         )
     return result

@@ -149,7 +149,7 @@ class MissionSession(SharedView):
             if question is None or question is not view.question or not view.waits_for_answer:
                 raise MissionError("this question is no longer open; look at the mission again")
             if isinstance(answer, int) and not 0 <= answer < len(question.options):
-                raise MissionError(f"there is no option {answer + 1}; choose from 1 to {len(question.options)}")
+                raise MissionError(f"there is no option {answer + 1}; choose 1 to {len(question.options)}")
             if answer != "none" and more.strip():
                 raise MissionError('words can be added only to "none of these"; choose it, or leave them out')
             self.is_changed_by_person |= bool(more.strip())
