@@ -45,7 +45,7 @@ class PriorApproval:
         return None if view.contract is None else cls(view.id, view.contract, before)
 
     def allows(self, view: SessionView, past: MissionPast) -> bool:
-        """Whether the program in `view`, which continues the mission `past`, does only what was approved."""
+        """Whether the program in `view`, which continues `past`, does only what the contract still allows."""
         if view.contract is None or view.problems:
             return False
         return not view.contract.excess_over(self.contract_after(past.trace)).skills

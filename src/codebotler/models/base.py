@@ -71,8 +71,8 @@ def make_reply(
 ) -> Reply:
     """Extract the program from a model's text, and build a `Reply`.
 
-    `opening` is the prompt that a base model continues, None for a chat model. `known_kind` says why there is
-    no program, if the server does. `has_answer` is False for a refusal, tool calls or an error message.
+    `opening` is the prompt that a base model continues, None for a chat model. `known_kind` is the server's
+    own reason for a missing program. `has_answer` is False for a refusal, tool calls or an error message.
     """
     answer = text if has_answer else ""
     code = answer if opening is None else opening.program_from(answer)

@@ -48,7 +48,7 @@ def classify_reply(
     has_code: bool,
     known_kind: NoProgram | None = None,
 ) -> NoProgram | None:
-    """Return why a reply contains no program, or None if it contains a program or text that may be one.
+    """Return why a reply contains no program, or None if it contains, or may contain, a program.
 
     If a reply was cut off after a complete program, this program counts. If it was cut off inside a program,
     the reply contains none, even if the part that arrived parses.

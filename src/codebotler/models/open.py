@@ -86,14 +86,14 @@ def kind_of(name: str) -> str:
 
 @dataclass(frozen=True)
 class ChosenModel:
-    """The name of a model, with the server and the token limit to use it with."""
+    """The name of a model, with the server and the token limit for its requests."""
 
     name: str  # the argument for `open_model`
     base_url: str | None = None  # None means the provider's own server
     max_tokens: int | None = None  # None means the default limit for a reply
 
     def add_server(self, settings: SamplingSettings) -> SamplingSettings:
-        """Return the settings with this model's server and, if they have no token limit, with its limit."""
+        """Return the settings with this model's server, and with its token limit if they have none."""
         limit = settings.max_tokens or self.max_tokens
         return replace(settings, base_url=self.base_url, max_tokens=limit)
 

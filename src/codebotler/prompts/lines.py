@@ -73,7 +73,7 @@ def trim(lines: Sequence[str]) -> Sequence[str]:
 
 
 def without_residue(line: str) -> str:
-    """Return a line without chat template tokens at both ends, and without a fence at its end."""
+    """Return a line without chat template tokens at both ends, and without a code fence at its end."""
     while (shorter := RESIDUE.sub("", line)) != line:
         line = shorter
     return line
