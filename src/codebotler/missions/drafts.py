@@ -20,11 +20,11 @@ def examine_draft(
     """Check a program, and return the results as values for fields of `SessionView`, such as `check`.
 
     Args:
-        program: the program.
-        view: the view of the session.
-        order: the order. If its `drive` runs in place of this program, its contract applies instead.
+        program: the program to check.
+        view: the session's view, which holds the rules, the rooms and any earlier mission.
+        order: the session's order. If it has a `drive` for this program, its contract replaces the check's.
         robot: the connected robot.
-        is_wanted: says whether the result is still needed. If not, UnwantedCheckError is raised.
+        is_wanted: returns whether the result is still needed. If not, UnwantedCheckError is raised.
     """
     rules, skills = view.rules_in_force, robot.skills
     found = check(

@@ -44,7 +44,7 @@ class LiveRobot:
     """Executes the skills that a program calls on a connected robot, real or simulated.
 
     `Worker.run_live` runs the program. `place` is the robot's current room, or "". The program's clock starts
-    at `clock_starts`, by default the local time. Breaking a rule of `guard` presses `button`.
+    at `clock_starts`, by default the local time. Breaking a rule of `guard` presses the stop `button`.
     """
 
     is_live = True
@@ -95,7 +95,7 @@ class LiveRobot:
         self._button.cancel_robot()
 
     def sleep_until(self, now: float) -> None:
-        """Wait until `now` seconds after the program's first skill, or raise StoppedError after a stop."""
+        """Wait until `self.now` reaches the argument `now`, in seconds. Raise StoppedError after a stop."""
         self.check_end()
         seconds = max(0.0, now - self.now)
         at = {} if self.line is None else {"line": self.line}
@@ -107,7 +107,7 @@ class LiveRobot:
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute a skill and return its result. Raise RobotError if the skill fails or a rule refuses it.
 
-        StoppedError, RobotLostError, and OSError (logging failed) end the program.
+        Raise StoppedError, RobotLostError, or OSError (logging failed) to end the program.
         """
         self.check_end()
         try:
@@ -331,7 +331,7 @@ class LiveRobot:
         return check_answer(skill, self.robot.perform(skill.name, given, on_feedback))
 
     def check_end(self) -> None:
-        """Raise StoppedError or another error if the program must end. The first call starts the clock."""
+        """Raise StoppedError or another error if the program must end. The first call starts its clock."""
         if self._began is None:
             self._began = self.robot.clock.now
             watch = getattr(self.robot, "watch", None)  # an optional method
@@ -344,11 +344,11 @@ class LiveRobot:
 
 
 def check_answer(skill: Skill, result: base.RobotResult) -> base.RobotResult:
-    """Return a robot's answer unchanged, or raise RobotLostError if its type does not match the skill."""
+    """Return a robot's result for a skill unchanged, or raise RobotLostError if its type is wrong."""
     if not skill.returns.fits(result):
-        expected = skill.returns.annotation
         raise RobotLostError(
-            f"the robot answered {skill.name} with {result!r:.100}, but {expected} was expected"
+            f"the robot answered {skill.name} with {result!r:.100}, which is not of the type "
+            f"{skill.returns.annotation}; correct the robot's driver"
         )
     return result
 

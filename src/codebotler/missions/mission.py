@@ -146,10 +146,10 @@ class Mission:
             self._has_program = True
 
     def record_check(self, problems: Sequence[str]) -> None:
-        """Record the problems that a program check found. Raise MissionError if there is no program."""
+        """Record the problems that a check found, in sentences. Raise MissionError if there is no program."""
         with self._writing:
             if not self._has_program:
-                raise MissionError(f"mission {self.id} has no program to check")
+                raise MissionError(f"mission {self.id} has no program to check; set a program first")
             self._step(MissionState.CHECKED, "be checked", problems=tuple(problems))
 
     def approve(self, *, despite_problems: bool = False, by: str = "") -> None:
@@ -384,4 +384,4 @@ def _make_mission_folder(missions: Path) -> Path:
         with suppress(FileExistsError):
             (folder := missions / f"{name}{suffix}").mkdir()
             return folder
-    raise AssertionError("there are endless names")
+    raise AssertionError("this loop ends only by returning a folder")

@@ -102,7 +102,7 @@ def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
 def expect_enforceable(
     rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None, remark: Callable[[str], None]
 ) -> None:
-    """Raise UserError or NotReadyError if a rule cannot be enforced. Call `remark` if one can be evaded."""
+    """Raise UserError or NotReadyError if a rule cannot be enforced. Tell `remark` how one can be evaded."""
     rooms = () if room_map is None else room_map.goals
     for sentence in (one for rule in rules for one in unknown_rooms_in(rule, rooms)):
         raise UserError(sentence)
@@ -127,7 +127,7 @@ def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) 
 
 
 def limit_rooms(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:
-    """Return `room_map`, or None if it has too many rooms for a check, and say so with `remark`."""
+    """Return `room_map`. If it has too many rooms for a check, tell `remark` so, and return None."""
     if room_map is None or len(room_map.rooms) <= MAX_CHECKED_ROOMS:
         return room_map
     remark(
@@ -148,7 +148,7 @@ def unknown_rooms(program: str, room_map: RoomMap, skills: SkillTable = SKILLS) 
 
 
 def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
-    """Return the recorded instructions whose rooms the robot knows (None: all), each with its program."""
+    """Return recorded instructions with their programs. With a map, only those that name its rooms."""
     replies = open_recorded("recorded").replies
     known = {instruction: solutions[0].program for instruction, solutions in replies.items()}
 

@@ -26,7 +26,7 @@ from codebotler.simulator.guard.contract import Contract
 
 @dataclass(frozen=True)
 class PriorApproval:
-    """An earlier approval of a program, which may cover the rest of a mission.
+    """The approval of a mission's program, which may also cover a program that continues the mission.
 
     Args:
         mission: the ID of the approved mission.
@@ -45,13 +45,13 @@ class PriorApproval:
         return None if view.contract is None else cls(view.id, view.contract, before)
 
     def allows(self, view: SessionView, past: MissionPast) -> bool:
-        """Whether the program in `view`, which continues the mission `past`, does only what was approved."""
+        """Whether the program in `view`, which continues `past`, does only what the contract still allows."""
         if view.contract is None or view.problems:
             return False
         return not view.contract.excess_over(self.contract_after(past.trace)).skills
 
     def contract_after(self, trace: Trace) -> Contract:
-        """Return the contract minus the calls since the approval: after one `pick`, 2 of 3 are left."""
+        """Return what the contract still allows after `trace`: if 1 of 3 `pick` calls is done, 2 are left."""
         rows = (by_event(event.kind) for event in trace[self.done_before :] if not event.failed)
         done = Counter(row.name for row in rows if row is not None)
         return Contract(
@@ -67,7 +67,7 @@ class PriorApproval:
 def is_recoverable(view: SessionView, events: Sequence[LogLine], skills: SkillTable) -> bool:
     """Whether a mission failed because a skill failed, so that a model may write a program for the rest.
 
-    False if it called a skill with an effect that traces do not show, since a second call would go unnoticed.
+    False if the mission called a skill whose effect traces do not show: nobody would notice a second call.
     """
     ends = [line for line in events if line["event"] in SKILL_END_EVENTS]
     failed = bool(ends) and ends[-1]["event"] == "error" and view.reason.startswith(f"{ends[-1]['kind']}: ")
@@ -77,7 +77,7 @@ def is_recoverable(view: SessionView, events: Sequence[LogLine], skills: SkillTa
 
 
 def past_to_recover(session: MissionSession, robot: Robot, home: Path) -> MissionPast | None:
-    """Wait for a session to end. Return its past if a skill failed, or None if a person must decide."""
+    """Wait until a session ends. Return its past if a model may continue the mission, otherwise None."""
     session.join()
     if not is_recoverable(session.view, session.events(), robot.skills):
         return None
@@ -89,8 +89,8 @@ def ask_evidence(
 ) -> list[str]:
     """Return sentences that help a person to decide whether the step `past.unsure` happened.
 
-    A real robot is connected and asked where it is, unless it is in use or `stop_button` is pressed.
-    `remark` receives likely mistakes in its setup.
+    Connect a real robot and ask where it is. `remark` receives a sentence if this fails, for example because
+    the robot is in use or `stop_button` was pressed.
     """
     before = [past.last_position_text] if past.last_position_text else []
     if is_resumable(robot):  # it knows no more than the log

@@ -33,7 +33,7 @@ LIMITED_SIMULATION = replace(SIMULATION, limits=Limits())  # nobody waits to sto
 
 @dataclass(frozen=True)
 class RuleEffect:
-    """How a run ended, and the house rule that stopped the run or, if none did, first refused a step."""
+    """How a run ended, and the house rule that stopped it. If none did: the first that refused a step."""
 
     ended: str  # finished, stopped, the kind of the error, or the final state of a logged mission
     rule: str = ""
@@ -52,14 +52,14 @@ class RuleEffect:
 
 
 class NotingGuard(RuleGuard):
-    """A rule guard that also collects the violations it raises, in `violations`."""
+    """A rule guard that also records the violations that it raises, in `violations`."""
 
     def __init__(self, rules: Sequence[Rule], world: World | None) -> None:
         super().__init__(rules, NO_ROOMS if world is None else RoomMap.of(world))
         self.violations: list[RuleViolationError] = []
 
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute a skill on a robot and return its result. Collect and raise the violation of any rule."""
+        """Execute a skill on a robot and return its result. Record a rule violation before raising it."""
         try:
             return super().perform(robot, skill, arguments)
         except RuleViolationError as broken:
@@ -67,7 +67,7 @@ class NotingGuard(RuleGuard):
             raise
 
     def find_first_unkept(self) -> RuleViolationError | None:
-        """If ending now would break a rule, collect and return this violation; otherwise return None."""
+        """If ending now would break a rule, record and return this violation; otherwise return None."""
         broken = super().find_first_unkept()
         self.violations += [broken] if broken else []
         return broken
@@ -76,7 +76,7 @@ class NotingGuard(RuleGuard):
 def find_program_effects(
     programs: Iterable[str], rules: Sequence[Rule], world: World | None, skills: SkillTable
 ) -> Iterator[RuleEffect]:
-    """Run each program once, in `world` or, if it is None, in a sampled world. Yield the effects in order."""
+    """Run each program once, in `world` or, if that is None, in a sampled one. Yield the effects in order."""
     sampler = first_samplers(CheckSettings())[0]
     with WorkerPool(cores()) as pool:
 

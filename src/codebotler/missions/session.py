@@ -93,7 +93,7 @@ class MissionSession(SharedView):
         self._thread.join(seconds)
 
     def edit(self, program: str) -> None:
-        """Replace the program and check it in the background. Raise MissionError if that is impossible."""
+        """Replace the program and check it in the background. Raise MissionError if edits are not allowed."""
         with self._editing, self._lock:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed while a model writes or after approval")
@@ -135,21 +135,21 @@ class MissionSession(SharedView):
             self._change(busy=f"asking {self._view.model}", is_written=True, reply="")
 
     def answer(self, question: ClarifyingQuestion | None, answer: ClarifyingAnswer, more: str = "") -> None:
-        """Continue with a person's answer to a clarifying question.
+        """Continue with a person's answer to `question`, the clarifying question that they saw.
 
-        `answer` is the index of an option, `decide` for the first one, or `none`. With `none`, the sentence
-        `more` is added to the instruction, and the model is asked again. Without a sentence, or after the
+        `answer` is an option's index (from 0), `decide` for the first one, or `none`. With `none`, the text
+        `more` is added to the instruction, and the model is asked again. Without a text, or after the
         last question, `none` ends the mission.
 
         Raises:
-            MissionError: this question is no longer open, or there is no such option.
+            MissionError: the question is not open, there is no such option, or `more` came without `none`.
         """
         with self._editing, self._lock:
             view = self._view
             if question is None or question is not view.question or not view.waits_for_answer:
                 raise MissionError("this question is no longer open; look at the mission again")
             if isinstance(answer, int) and not 0 <= answer < len(question.options):
-                raise MissionError(f"there is no option {answer + 1}; choose one of {len(question.options)}")
+                raise MissionError(f"there is no option {answer + 1}; choose 1 to {len(question.options)}")
             if answer != "none" and more.strip():
                 raise MissionError('words can be added only to "none of these"; choose it, or leave them out')
             self.is_changed_by_person |= bool(more.strip())
@@ -178,11 +178,11 @@ class MissionSession(SharedView):
             if self._is_stopped:
                 raise MissionError("the mission is being stopped; its program cannot be approved")
             if mission is None or view.busy or view.question is not None:
-                raise MissionError("the program is not checked yet, or a question about it is still open")
+                raise MissionError("the program is not checked yet, or a question is open; wait or answer it")
             if seen != view.digest or seen != program_digest(mission.summary.program):
                 raise MissionError("the program has changed; review the new program")
             if disabled_rules is not None and disabled_rules != view.disabled_rules:
-                raise MissionError("other rules are switched off now; review the program again")
+                raise MissionError("the list of switched-off rules has changed; review the program again")
             if not view.can_run:
                 raise MissionError("this program has a syntax error; correct the program")
             if self.is_changed_by_person and not is_person:
@@ -196,7 +196,7 @@ class MissionSession(SharedView):
         self._mission.fail(reason)
 
     def stop(self, by: str) -> None:
-        """Stop the robot, then all other work. Return once the request has reached the robot."""
+        """Stop the robot, then other work. Return once the robot has the request. The log names `by`."""
         has_ended = self._view.is_over or (self._mission is not None and self._mission.has_ended)
         if self.may_move or not has_ended:
             self._stop_button.press(by)

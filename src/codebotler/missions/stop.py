@@ -57,7 +57,7 @@ class StopButton:
             self.cancel_robot()
 
     def on_press(self, listener: Callable[[], None]) -> None:
-        """Call a function at each press, and also now if the button was already pressed."""
+        """Call `listener` at each later press, and at once if the button was already pressed."""
         with self._lock:
             self._listeners.append(listener)
             is_pressed = self.by is not None
@@ -66,7 +66,7 @@ class StopButton:
 
     @property
     def seconds(self) -> float:
-        """Seconds from the first press until the request reached the robot, or until now."""
+        """Seconds from the first press until the robot had the request, or until now if it has not yet."""
         return max(0.0, min(self._reached_at, time.monotonic()) - self._pressed_at)
 
     def why_unstopped(self) -> str:

@@ -33,7 +33,7 @@ class Usage:
 
 @dataclass(frozen=True)
 class Reply:
-    """A model's reply to a prompt, and the program that was extracted from it."""
+    """A model's reply: its text, the program extracted from it, its token counts, and why it ended."""
 
     text: str = field(repr=False)  # the complete reply with tool calls, or the message of a refusal
     program: str = field(repr=False)  # the program in the reply; it may not parse
@@ -71,8 +71,8 @@ def make_reply(
 ) -> Reply:
     """Extract the program from a model's text, and build a `Reply`.
 
-    `opening` is the prompt that a base model continues, None for a chat model. `known_kind` says why there is
-    no program, if the server does. `has_answer` is False for a refusal, tool calls or an error message.
+    `opening` is the prompt that a base model continues, None for a chat model. `known_kind` is the server's
+    own reason for a missing program. `has_answer` is False for a refusal, tool calls or an error message.
     """
     answer = text if has_answer else ""
     code = answer if opening is None else opening.program_from(answer)
@@ -95,7 +95,7 @@ class Model(Protocol):
 
     @property
     def name(self) -> str:
-        """The name on the command line and in runs, such as `openai-chat:gpt-5.1`."""
+        """The model's name on the command line and in runs, such as `openai-chat:gpt-5.1`."""
 
     @property
     def settings(self) -> SamplingSettings:

@@ -38,7 +38,7 @@ def read_key(variable: str) -> str | None:
 
 @contextmanager
 def hide_variables(variables: Iterable[str]) -> Iterator[None]:
-    """Hide environment variables from libraries during a `with` block, and restore them afterwards."""
+    """Remove environment variables during a `with` block, so that libraries cannot read them."""
     before = {name: os.environ.pop(name) for name in variables if name in os.environ}
     try:
         yield
@@ -47,14 +47,14 @@ def hide_variables(variables: Iterable[str]) -> Iterator[None]:
 
 
 def redact(text: str) -> str:
-    """Return an error or log line without the values of key variables and text that looks like a key."""
+    """Return an error or log line with `[key removed]` in place of keys and of text that looks like a key."""
     # KEY_REMOVED comes first, since otherwise a short secret could match a part of it.
     rest = "|".join([re.escape(KEY_REMOVED), KEY_SHAPES, *_secrets(MIN_SECRET_IN_ERRORS)])
     return re.sub(rest, KEY_REMOVED, remove_keys(text))
 
 
 def remove_keys(text: str) -> str:
-    """Return a reply without the values of key variables that have 8 or more characters."""
+    """Return a reply with `[key removed]` in place of the environment's keys of 8 or more characters."""
     secrets = _secrets(MIN_SECRET)
     return re.sub("|".join(secrets), KEY_REMOVED, text) if secrets else text
 
@@ -93,11 +93,8 @@ _REDACTION = _Redaction()
 
 
 def guard_logs() -> None:
-    """Remove keys from client libraries' logs, and silence their warnings. Call this after importing them.
-
-    The warnings are not needed, because CodeBotler itself names the settings that a model does not support.
-    """
-    warnings.filterwarnings("ignore", module="|".join(CLIENT_LOGGERS))
+    """Remove keys from client libraries' logs, and silence their warnings. Call this after importing them."""
+    warnings.filterwarnings("ignore", module="|".join(CLIENT_LOGGERS))  # CodeBotler gives better ones
     prefixes = tuple(f"{name}." for name in CLIENT_LOGGERS)
     children = [name for name in logging.root.manager.loggerDict if name.startswith(prefixes)]
     for name in (*CLIENT_LOGGERS, *children):

@@ -45,7 +45,7 @@ class _Job:
         return self.on_text is not None and not self.ending.done()
 
     def pass_on(self, text: str) -> None:
-        """Pass the new part of a string from the model's thread to the listener."""
+        """Send the listener the part of `text` that it has not received. Call this on the model's thread."""
         if self.on_text is not None and self.is_wanted and len(text) > self.passed:
             self.ending.get_loop().call_soon_threadsafe(self.on_text, text[self.passed :])
             self.passed = len(text)
@@ -99,7 +99,7 @@ class LocalModel:
         guard_logs()
 
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
-        """Generate one reply. Raise ModelError if this fails."""
+        """Generate reply `number` to a prompt, counted from 0. Raise ModelError if this fails."""
         start = time.monotonic()
         job = self._job(prompt, number)
         job.on_text = on_text
@@ -250,7 +250,7 @@ class LocalModel:
 
 
 def find_source(path: str) -> str:
-    """Return a model's folder with `~` expanded, or its hub name. Raise UserError if a folder is missing."""
+    """Return a model's folder with `~` expanded, or its hub name. Raise UserError for a missing folder."""
     folder = Path(path).expanduser()
     if path.startswith((".", "/", "~")) and not folder.is_dir():
         raise UserError("there is no such model folder; correct the path", file=path)

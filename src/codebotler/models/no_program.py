@@ -36,7 +36,7 @@ _BY_REASON: Mapping[str, NoProgram] = {
 
 
 def is_cut_off(finish_reason: str | None) -> bool:
-    """Return whether the server says that a reply reached the token limit."""
+    """Return whether a server's finish reason, such as `length`, means that the token limit was reached."""
     return (finish_reason or "").lower() in _CUT_OFF
 
 
@@ -48,7 +48,7 @@ def classify_reply(
     has_code: bool,
     known_kind: NoProgram | None = None,
 ) -> NoProgram | None:
-    """Return why a reply contains no program, or None if it contains a program or text that may be one.
+    """Return why a reply contains no program, or None if it contains, or may contain, a program.
 
     If a reply was cut off after a complete program, this program counts. If it was cut off inside a program,
     the reply contains none, even if the part that arrived parses.
@@ -57,7 +57,7 @@ def classify_reply(
         reply: the text, or None if it was not recorded.
         program: the extracted program.
         finish_reason: the server's finish reason, or None if it gave none.
-        has_code: whether the reply contains any code.
+        has_code: whether the reply contains any lines of code.
         known_kind: the kind of reply, if the server reported it outside the text, such as in a refusal field.
     """
     by_reason = _BY_REASON.get((finish_reason or "").lower())

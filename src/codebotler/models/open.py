@@ -60,7 +60,7 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
 
 
 def expect_server(*names: str) -> None:
-    """Raise UserError if none of the named models runs on a server, so that a base URL would be useless."""
+    """Raise UserError if a base URL would have no effect, because none of these models is on a server."""
     if not any(map(runs_on_server, names)):
         fix = "leave it out, or choose a model such as openai-chat:NAME"
         raise UserError(f"{' and '.join(names)} cannot use a base URL; {fix}")
@@ -72,7 +72,7 @@ def runs_on_server(name: str) -> bool:
 
 
 def kind_of(name: str) -> str:
-    """Return the part of a model's name before the colon, or raise UserError if the name is invalid."""
+    """Return the kind in a model's name, such as `hf` in `hf:PATH`. Raise UserError if it is invalid."""
     kind, _, rest = name.partition(":")
     if kind == "recorded":
         open_recorded(name)
@@ -86,20 +86,20 @@ def kind_of(name: str) -> str:
 
 @dataclass(frozen=True)
 class ChosenModel:
-    """The name of a model, with the server and the token limit to use it with."""
+    """The name of a model, with the server and the token limit for its requests."""
 
     name: str  # the argument for `open_model`
     base_url: str | None = None  # None means the provider's own server
     max_tokens: int | None = None  # None means the default limit for a reply
 
     def add_server(self, settings: SamplingSettings) -> SamplingSettings:
-        """Return the settings with this model's server and, if they have no token limit, with its limit."""
+        """Return the settings with this model's server, and with its token limit if they have none."""
         limit = settings.max_tokens or self.max_tokens
         return replace(settings, base_url=self.base_url, max_tokens=limit)
 
 
 class ConfigFile(BaseModel):
-    """The contents of config.yaml."""
+    """The contents of config.yaml: the default model with its settings, and addresses of the page."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -138,7 +138,7 @@ def choose_model(name: str | None = None, base_url: str | None = None) -> Chosen
 def make_opener(
     models: Sequence[str], base_url: str | None, settings: SamplingSettings
 ) -> Callable[[str], Model]:
-    """Return a function that opens models by name. Raise UserError at once if a name is invalid."""
+    """Return a function that opens models by name. Raise UserError now if a name in `models` is invalid."""
     for each in models:
         kind_of(each)
     if base_url is not None:

@@ -41,7 +41,7 @@ class RateLimited:
         retries: how many times to repeat a failed request, at least 0.
         token_budget: the number of tokens after which no request starts. Running requests complete. If the
             model does not count tokens, three characters are assumed per token. None for no limit.
-        first_wait: about how many seconds to wait before the second try. The wait doubles each time.
+        first_wait: about how many seconds to wait before the second try. The wait doubles with each try.
 
     Raises:
         UserError: a limit is out of range.
@@ -65,7 +65,7 @@ class RateLimited:
     def __post_init__(self) -> None:
         limits = self.concurrency, self.requests_per_minute, self.token_budget
         if self.retries < 0 or any(limit is not None and not limit > 0 for limit in limits):
-            raise UserError("concurrency, rate and token budget must be above 0, and retries at least 0")
+            raise UserError("concurrency, request rate and token budget must be above 0; retries at least 0")
         self._free = asyncio.Semaphore(self.concurrency)
 
     async def reply(
@@ -76,9 +76,9 @@ class RateLimited:
         on_text: TextListener = ignore_text,
         around: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> Reply:
-        """Request one reply, with retries. Each try passes the reply to `on_text` from the beginning.
+        """Request reply `number`, with retries. Each try passes its text to `on_text` from the beginning.
 
-        Each try runs inside a context from `around`, which is entered when the limits let the try start.
+        Each try runs in a context made by `around`, for example to log when the limits let the try start.
 
         Raises:
             ModelError: the last try failed.

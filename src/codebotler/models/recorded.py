@@ -43,7 +43,7 @@ class Solution(_RecordedPart):
 
 
 class Continuation(_RecordedPart):
-    """A hand-written program for the rest of a mission, deliberately right or wrong."""
+    """A hand-written program for the rest of a mission that ended early, deliberately right or wrong."""
 
     about: str  # its special feature or its mistake, in a few words
     after: tuple[str, ...]  # the last step before the mission ended, in words; each of these fits
@@ -52,7 +52,7 @@ class Continuation(_RecordedPart):
 
 
 class InstructionSolutions(_RecordedPart):
-    """The replies of the recorded models to one instruction."""
+    """An instruction with the programs of both recorded models, and programs that continue its mission."""
 
     instruction: str
     careful: Annotated[tuple[Solution, ...], Field(min_length=1)]
@@ -117,8 +117,8 @@ class RecordedModel:
             return self.solution(instruction, number).program
         program = self.rests.get((instruction, last_step))
         if program is None:
-            what = f"{self.name} has no program for the rest of this mission after this step: {last_step}"
-            raise ModelError(f"{what}; choose a language model, or write that program", is_temporary=False)
+            what = f"{self.name} has no program that continues this mission after this step: {last_step}"
+            raise ModelError(f"{what}; choose a language model, or write the program", is_temporary=False)
         return program
 
     async def close(self) -> None:
@@ -126,7 +126,7 @@ class RecordedModel:
 
 
 def find_closest(instruction: str, known: Iterable[str]) -> list[str]:
-    """Return the three known instructions that have most words of four or more letters in common."""
+    """Return the (up to) three known instructions that share the most words of four or more letters."""
     words = {*LONG_WORD.findall(instruction.lower())}
 
     def rank(other: str) -> tuple[int, int]:
@@ -140,12 +140,15 @@ def _words(text: str) -> tuple[str, ...]:
 
 
 def is_recorded(name: str) -> bool:
-    """Return whether a name, such as `recorded:careful`, belongs to a recorded model."""
+    """Return whether a model's name, such as `recorded:careful`, means a recorded model."""
     return name.partition(":")[0] == "recorded"
 
 
 def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
-    """Open `recorded:careful`, `recorded:hasty` or `recorded:FOLDER`. `folder` can add solution files."""
+    """Open `recorded:careful`, `recorded:hasty` or `recorded:FOLDER`. Raise UserError for an unknown name.
+
+    The first two also read the solution files in `folder`, if given.
+    """
     short = name.removeprefix("recorded").removeprefix(":") or RECORDED_NAMES[0]
     if short not in RECORDED_NAMES and Path(short).is_dir():
         own = _read(Path(short))

@@ -29,7 +29,7 @@ MODEL_HINT = "set OPENAI_API_KEY or another provider's key, or start a model ser
 
 @dataclass(frozen=True)
 class UsableModel:
-    """A model that can be used now."""
+    """A model that can be used now: its `--model` name, why it can be used, and its server if local."""
 
     name: str  # the value for `--model`
     why: str  # why the model can be used, such as `OPENAI_API_KEY is set`
@@ -43,7 +43,7 @@ class UsableModel:
 
 
 def find_usable_models(servers: Mapping[str, int] = MODEL_SERVERS) -> list[UsableModel]:
-    """Return the models of local servers (given with their ports), one for each key, and recorded ones."""
+    """Return usable models: those on local `servers` (name to port), one per API key, and recorded ones."""
     local = [model for server, port in servers.items() for model in _list_models(server, port)]
     keys = [key for key in KEY_VARIABLES if os.environ.get(key, "").strip()]
     by_key = [UsableModel(KEY_VARIABLES[key], f"{key} is set") for key in keys]

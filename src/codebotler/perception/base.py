@@ -22,7 +22,7 @@ class Sighting:
 
     Args:
         found: whether the image shows the object or person.
-        box: the box around the clearest match, or None if `found` is False.
+        box: left, top, right and bottom of the clearest match, from 0 to 1 of the image; None if not found.
         score: the model's confidence, from 0 to 1. Scores from different models are not comparable.
 
     Raises:
@@ -68,7 +68,7 @@ class Detector(Protocol):
 
 
 class PerceptionError(Exception):
-    """A detector has failed. The sentence gives the reason and contains no API keys."""
+    """Raised if a detector failed. Its `sentence` gives the reason and contains no API keys."""
 
     def __init__(self, sentence: str) -> None:
         super().__init__(sentence)
@@ -76,7 +76,7 @@ class PerceptionError(Exception):
 
 
 def clean_label(label: str) -> str:
-    """Return the label as one line, or raise UserError if it is empty, too long or not printable."""
+    """Return a label as one line. Raise UserError if it is empty, unprintable or over 200 characters."""
     words = " ".join(label.split())
     if not (0 < len(words) <= MAX_LABEL_CHARACTERS and words.isprintable()):
         limits = f"use 1 to {MAX_LABEL_CHARACTERS} printable characters"

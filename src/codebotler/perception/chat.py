@@ -68,7 +68,7 @@ class _DetectorAnswer(BaseModel):
 
 
 def parse_sighting(text: str) -> Sighting:
-    """Parse a model's JSON reply, with or without a code fence. Raise ValueError if the reply is invalid."""
+    """Parse a model's JSON reply, which may be in a code fence. Raise ValueError if the reply is invalid."""
     if len(text) > MAX_REPLY_CHARACTERS:
         raise ValueError(f"the reply has {len(text):,} characters; use at most {MAX_REPLY_CHARACTERS:,}")
     fenced = FENCED_JSON.fullmatch(text.strip())

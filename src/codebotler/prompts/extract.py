@@ -44,7 +44,7 @@ class ReplyContent:
 
 
 def read_reply(reply: str, *, continues: bool = False) -> ReplyContent:
-    """Split a model's complete reply into a program and reasoning; see `program_of`.
+    """Split a model's complete reply into a program and reasoning, as `program_of` explains.
 
     Raises:
         EngineError: no isolated process can be started.
@@ -60,7 +60,7 @@ def program_of(reply: str, *, continues: bool = False) -> Program:
     """Return the program in a model's complete reply.
 
     If `task_program` is defined several times, the last complete definition counts. Reasoning between markers
-    such as `<think>` and `</think>` is dropped. Other pairs of markers also count if a program follows. Apart
+    such as `<think>` and `</think>` is dropped. So is text between other markers if a program follows. Apart
     from this, only chat template tokens, fences and lines that are certainly not code are dropped. A program
     that was cut off is not completed.
 
@@ -86,7 +86,7 @@ def program_in(text: str) -> str:
 
 @isolated("def task_program():\n    say('hello')\n")
 def defines_task(text: str) -> bool:
-    """Whether a string compiles and binds `task_program` at module level."""
+    """Whether a text is valid Python that defines or assigns `task_program` at module level."""
     return TASK_FUNCTION in module_bound_names(text)
 
 
@@ -94,7 +94,7 @@ def defines_task(text: str) -> bool:
     "Here it is:\n```python\ndef task_program():\n    greet()\n```\n```\ndef greet():\n    say('hello')\n```"
 )
 def extract(reply: str, *, continues: bool = False) -> tuple[str, str, bool]:
-    """Return the program and the reasoning in a reply, and whether the reply has any code."""
+    """Return the program and the reasoning in a reply, and whether it has any code; see `program_of`."""
     lines = re.split(r"\r\n|\r|\n", reply.removeprefix("\ufeff"))
     if _is_program(lines, continues=continues):
         return _join([lines]), "", True
@@ -134,7 +134,7 @@ class _Block:
 
     @property
     def is_outline(self) -> bool:
-        """Whether its `task_program` contains nothing but a docstring, `...` or `pass`."""
+        """Whether `task_program` in this block contains nothing but a docstring, `...` or `pass`."""
         definitions = [] if self.tree is None else task_definitions(self.tree)
         return any(all(map(_is_idle, last.body)) for last in definitions[-1:])
 

@@ -48,12 +48,12 @@ def is_prose(line: str) -> bool:
 
 
 def continues_prose(line: str) -> bool:
-    """Whether a line after a line of prose is prose, too: it is neither blank nor code."""
+    """Whether a line that follows prose is prose, too, since it is neither blank nor code."""
     return bool(line.strip()) and not is_code(without_residue(line))
 
 
 def is_code(line: str) -> bool:
-    """Whether a line begins like code and is not a sentence about a call."""
+    """Whether a line begins like code. A sentence such as `go_to(room) drives there` is not code."""
     return bool(STATEMENT.match(line) or (CALL_START.match(line) and not _has_words(line)))
 
 
@@ -73,14 +73,14 @@ def trim(lines: Sequence[str]) -> Sequence[str]:
 
 
 def without_residue(line: str) -> str:
-    """Return a line without chat template tokens at both ends, and without a fence at its end."""
+    """Return a line without chat template tokens at both ends, and without a code fence at its end."""
     while (shorter := RESIDUE.sub("", line)) != line:
         line = shorter
     return line
 
 
 def parse_lines(lines: Sequence[str]) -> ast.Module | None:
-    """Return the syntax tree of some lines, or None if they do not parse."""
+    """Return the syntax tree of some lines, or None if they are not valid Python."""
     return _parse_text("\n".join(lines))
 
 

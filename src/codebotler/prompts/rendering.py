@@ -105,9 +105,9 @@ class Prompt:
 
 
 def task_end(opening: str, reply: str, stop: Sequence[str] = STOP_TEXTS) -> int:
-    """Return the index in a base model's reply where the function ends that begins with `opening`.
+    """Return the index at which a base model's reply completes the function begun by `opening`.
 
-    It ends before the first line without indentation outside brackets and strings, or before a `stop` text.
+    This is before the first unindented line outside brackets and strings, or before a `stop` text.
     """
     stops = [at for at in (reply.find(text) for text in stop) if at >= 0]
     end = min(stops, default=len(reply))
@@ -132,7 +132,7 @@ def prompt_for(
     rules: Sequence[str] = (),
     skills: SkillTable = SKILLS,
 ) -> Prompt:
-    """Return the prompt that asks a model for a program which carries out an instruction.
+    """Return the prompt that asks a model to write a program for an instruction.
 
     Args:
         instruction: the robot's task, in plain words.
@@ -170,7 +170,7 @@ def prompt_for(
 
 
 def stub(skill: Skill) -> str:
-    """Return a skill as prompts show it: signature, docstring, errors and, if custom, an example call."""
+    """Return a skill as prompts show it: as a Python function. Custom skills get an example call, too."""
     lines = [skill.doc.replace('"""', "'''")]
     if skill.fails:
         lines.append(f"Fails with an exception if {listed([when for _, when in skill.fails], 'or if')}.")

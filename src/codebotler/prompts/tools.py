@@ -22,7 +22,7 @@ _JSON_TYPES = {"str": "string", "int": "integer", "float": "number", "bool": "bo
 
 @dataclass(frozen=True)
 class Tool:
-    """A function that a model may call."""
+    """A function that a model may call: its name, description and JSON Schema."""
 
     name: str
     description: str
@@ -47,7 +47,7 @@ class CallingMessage(PromptMessage):
 
 @dataclass(frozen=True)
 class ResultMessage(PromptMessage):
-    """The result of a call, as text."""
+    """A message that gives the model the result of a tool call, as text."""
 
     call: ToolCall
 
@@ -66,13 +66,13 @@ TO_END = "When everything is done, answer with a short sentence instead of a cal
 def agent_prompt(
     instruction: str, *, rules: Sequence[str] = (), skills: SkillTable = SKILLS, to_end: str = TO_END
 ) -> ToolPrompt:
-    """Return the request to carry out an instruction by calling skills.
+    """Return the prompt that asks a model to carry out an instruction by calling skills.
 
     Args:
         instruction: the robot's task, in plain words.
         rules: sentences that every mission must obey.
         skills: the skills that may be called.
-        to_end: how the mission is ended, in a sentence.
+        to_end: a sentence that tells the model how to end the mission.
 
     Raises:
         UserError: the instruction is empty.
@@ -115,7 +115,7 @@ def _schema(value: ValueType) -> dict[str, Any]:
 
 
 def object_schema(properties: dict[str, Any]) -> str:
-    """Return the JSON Schema, as JSON text, of an object that has all of these properties and no others."""
+    """Return the JSON Schema, as text, of an object with exactly these properties (name to schema)."""
     closed = {"required": [*properties], "additionalProperties": False}
     return json.dumps({"type": "object", "properties": properties, **closed})
 

@@ -25,7 +25,7 @@ from codebotler.rtl.wording import describe_action, describe_event, room, room_n
 
 @dataclass(frozen=True)
 class Explanation:
-    """The reason why a formula fails.
+    """The reason why a formula fails on a trace, and the event to blame.
 
     Args:
         event: the position, from 0, of the event that makes it fail; None if an event is missing.

@@ -143,9 +143,9 @@ class Scope:
     """The part of a trace before or after the first or last matching event.
 
     Args:
-        name: the part, which excludes the event itself.
-        element: matches the bounding event; without a match, the scope is the whole trace, or empty if the
-            name begins with `Only`.
+        name: which part, such as `AfterFirst`; the part excludes the event itself.
+        element: the pattern of the event. If no event matches, the scope is the whole trace, or is empty if
+            `name` begins with `Only`.
     """
 
     name: ScopeName
@@ -158,7 +158,7 @@ class Scope:
 
     @property
     def is_before(self) -> bool:
-        """Whether the scope is before the event."""
+        """Whether the scope is the part before the event, not the part after the event."""
         return "Before" in self.name
 
     def __str__(self) -> str:
@@ -177,11 +177,11 @@ class _OfEvent:
 
 
 class Exists(_OfEvent):
-    """Holds if some event matches."""
+    """Holds if some event within the scopes matches `element`."""
 
 
 class Last(_OfEvent):
-    """Holds if there is a last event and it matches."""
+    """Holds if the last event within the scopes matches `element`. Fails if there are no events."""
 
 
 @dataclass(frozen=True)
@@ -194,12 +194,12 @@ class _ActAtPlace:
 
     @cached_property
     def arrival(self) -> EventPattern:
-        """Matches the move that begins a stay."""
+        """The pattern of the move that begins a stay."""
         return EventPattern(GOTO, Regex(self.place))
 
     @cached_property
     def departure(self) -> EventPattern:
-        """Matches the move that ends a stay."""
+        """The pattern of the move that ends a stay."""
         return EventPattern(GOTO, Without(self.place))
 
     def __str__(self) -> str:
@@ -207,7 +207,7 @@ class _ActAtPlace:
 
 
 class ActAtFirst(_ActAtPlace):
-    """Holds if a matching event occurs during the first stay at a place."""
+    """Holds if an event matches `element` during the robot's first stay at `place`."""
 
     @cached_property
     def stay(self) -> tuple[Scope, ...]:
@@ -217,7 +217,7 @@ class ActAtFirst(_ActAtPlace):
 
 
 class ActAtSome(_ActAtPlace):
-    """Holds if a matching event occurs during any stay at a place."""
+    """Holds if an event matches `element` during any of the robot's stays at `place`."""
 
 
 @dataclass(frozen=True)
@@ -233,11 +233,11 @@ class _Counting:
 
 
 class Count(_Counting):
-    """Holds if exactly `number` events match."""
+    """Holds if exactly `number` events within the scopes match `element`."""
 
 
 class AtLeast(_Counting):
-    """Holds if at least `number` events match."""
+    """Holds if at least `number` events within the scopes match `element`."""
 
 
 @dataclass(frozen=True)

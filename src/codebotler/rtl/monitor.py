@@ -35,7 +35,7 @@ class Monitor:
 
     @property
     def is_final(self) -> bool | None:
-        """Whether no further event can change `holds`; None without `events`, or if this is too complex."""
+        """Whether no event can change `holds` any more. None without `events`, or if this is too complex."""
         if self._masks is None:
             return None
         possible, waiting = {self._state}, [self._state]
@@ -54,7 +54,7 @@ class Monitor:
         """Process the next event, and return whether the formula holds now.
 
         Raises:
-            Inconclusive: an option is not a string. The event is ignored.
+            Inconclusive: an option on which the result depends is not a string. The event is ignored.
             ValueError: the event matches none of `events`, and is ignored.
         """
         mask = self._machine.mask(event, self._seen)
@@ -92,7 +92,7 @@ class _Machine:
         return found
 
     def step(self, state: Any, mask: int) -> tuple[Any, bool]:  # noqa: ANN401 - as in Machine
-        """Return the next state, and whether the formula holds there, both of which are cached."""
+        """Return the state after an event with `mask`, and whether the formula holds there. Cache both."""
         known = self.steps.get((state, mask))
         if known is not None:
             return known

@@ -33,7 +33,7 @@ def whole_word(pattern: str) -> re.Pattern[str]:
 
 
 def quote(text: str) -> str:
-    """Write a regex as a Python string literal, in double quotes and raw where possible."""
+    """Return a regex as a Python string literal, in double quotes and raw where possible."""
     if "\\" in text and '"' not in text and text.isprintable():
         # No regex ends with a single backslash, so the closing quote is safe.
         return f'r"{text}"'
@@ -45,7 +45,7 @@ class Matcher(ABC):
     """The base class of patterns for texts, such as `Regex`."""
 
     def matches(self, text: str) -> bool:
-        """Whether a string matches. The result is cached, since programs repeat texts."""
+        """Whether this pattern matches `text`. The result is cached, since programs repeat texts."""
         known = self._known
         found = known.get(text)
         if found is None:

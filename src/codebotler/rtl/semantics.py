@@ -15,7 +15,7 @@ from codebotler.rtl import formulas
 
 @dataclass(eq=False, repr=False)
 class Inconclusive(Exception):  # noqa: N818 - a third verdict, not a mistake of the caller
-    """Raised if a formula depends on an option of a question that is not a string.
+    """Raised if the result of a formula depends on a question's option that is not a string.
 
     Args:
         event: the question's position in the trace, counted from 0.
@@ -48,7 +48,7 @@ def holds(formula: formulas.Formula, trace: Trace) -> bool:
 
 
 def compared_fields(trace: Trace) -> tuple[object, ...]:
-    """Return only those fields of each event that formulas can compare, such as its text but not its time."""
+    """Return the fields of events that formulas can compare (texts, not times), for use as a cache key."""
     return tuple(
         (e.kind, e.text, e.options, e.answer, e.found, e.place, e.holding, e.to, e.more) for e in trace
     )
@@ -72,7 +72,7 @@ def positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
 
 
 def is_match(element: formulas.EventPattern, event: Event, at: int) -> bool:
-    """Whether a pattern matches an event. Errors name its position `at` in the trace, counted from 0.
+    """Whether a pattern matches an event. Errors mention `at`, the event's position, counted from 0.
 
     Raises:
         Inconclusive: an option that is not a string precedes the first match.
@@ -122,7 +122,7 @@ def occurrences(element: formulas.EventPattern, trace: Trace, span: Iterable[int
 
 
 def at_least(element: formulas.EventPattern, number: int, trace: Trace, span: range) -> int:
-    """Count the matching events in a span, up to `number`."""
+    """Count the events in `span` that match `element`, but stop at `number`."""
     return sum(1 for _ in islice(occurrences(element, trace, span), min(number, len(span))))
 
 
@@ -135,13 +135,13 @@ def positions_in_scopes(scopes: tuple[formulas.Scope, ...], trace: Trace) -> ran
 
 
 def bounding_event(scope: formulas.Scope, trace: Trace, span: range) -> int | None:
-    """Return the position in `span` of the event at which a scope begins or ends, or None."""
+    """Return the position of the event at which a scope begins or ends, or None if `span` has none."""
     found = occurrences(scope.element, trace, span)
     return next(found, None) if scope.name.endswith("First") else max(found, default=None)
 
 
 def narrow(scope: formulas.Scope, at: int | None, span: range) -> range:
-    """Return the part of a span in a scope whose bounding event is at position `at`, or None if missing."""
+    """Return the part of `span` inside a scope. `at` is the position of its bounding event, or None."""
     if at is None:
         return range(span.stop, span.stop) if scope.is_only else span
     return range(span.start, at) if scope.is_before else range(at + 1, span.stop)

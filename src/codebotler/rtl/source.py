@@ -41,7 +41,7 @@ class FormulaSource:
         self.bytes = self.text.encode(errors="replace")  # `ast` counts columns in bytes
 
     def unknown(self, at: ast.expr, what: str, name: str, known: Iterable[str]) -> RtlSyntaxError:
-        """Return the error for an unknown name of a `what`, such as `test`, with a hint at `known` names."""
+        """Return the error for an unknown `name`, with a hint. `what` is its kind, such as `test`."""
         close = [SKILL_KINDS[name]] if name in SKILL_KINDS else get_close_matches(name, known, 1)
         hint = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(known)}"
         if name == INSIDE:
@@ -51,13 +51,13 @@ class FormulaSource:
         return self.error(at, f"unknown {what} {name}; {hint}")
 
     def expected(self, what: str, node: ast.expr) -> RtlSyntaxError:
-        """Return the error for a part of the formula that is not a `what`, such as `a string`."""
+        """Return the error for a part of the formula where `what`, such as `a string`, was expected."""
         found = brief(ast.get_source_segment(self.text, node) or "something else", _MAX_SHOWN_LENGTH)
         hint = "; put quotes around it" if "string" in what and isinstance(node, ast.Name) else ""
         return self.error(node.col_offset, f"expected {what}, found {found}{hint}")
 
     def error(self, at: ast.expr | int, problem: str) -> RtlSyntaxError:
-        """Return the error for a problem at a syntax node, or at an offset in bytes."""
+        """Return the error for a problem at a syntax node, or at an offset in the formula, in bytes."""
         if isinstance(at, ast.Attribute):
             at = (at.end_col_offset or 0) - len(at.attr.encode())
         offset = at if isinstance(at, int) else at.col_offset

@@ -83,14 +83,14 @@ class _Parser(FormulaSource):
 
     def formula(self) -> formulas.Formula:
         if not self.text:
-            raise RtlSyntaxError(1, "expected a formula, found nothing")
+            raise RtlSyntaxError(1, 'expected a formula such as tr.Exists(goto("lobby")), found nothing')
         try:
             tree = parse_expression(self.text)
         except SyntaxError as error:
             column = self.indent + max(error.offset or 1, 1)
             raise RtlSyntaxError(column, f"the formula cannot be read ({error.msg})") from None
         except (RecursionError, MemoryError):
-            raise RtlSyntaxError(self.indent + 1, "the formula is nested too deeply") from None
+            raise RtlSyntaxError(self.indent + 1, "the formula is nested too deeply; simplify it") from None
         except ValueError as error:
             raise RtlSyntaxError(self.indent + 1, f"the formula cannot be read ({error})") from None
         end = tree.end_col_offset or 0
@@ -118,7 +118,7 @@ class _Parser(FormulaSource):
         raise self.expected('a test such as tr.Exists(goto("lobby"))', node)
 
     def last_look(self, name: str, node: ast.Call) -> formulas.Formula:
-        """Parse a test of the most recent look: since the opposite result, this one has occurred."""
+        """Parse `last_found(...)` or `last_missed(...)`, which test the last look for a thing."""
         (thing,) = self.arguments(node, node, name, 1)
         text, found = self.matched(thing), LAST_LOOKS[name]
         wanted, opposite = (formulas.EventPattern(self.look or "", text, found=f) for f in (found, not found))
@@ -139,7 +139,7 @@ class _Parser(FormulaSource):
         return _joined(formulas.Or, [self.is_in_state(name, each) for each in things])
 
     def is_in_state(self, name: str, thing: ast.expr) -> formulas.Formula:
-        """Say that an event has set a state since the last event of each kind that clears it."""
+        """Return the formula that an event has set a state, and no later event has cleared it."""
         rows = self.recordings.items()
         setting = [self.event_of(kind, thing) for kind, row in rows if row.sets == name]
         clearing = [self.event_of(kind, thing) for kind, row in rows if row.clears == name]
@@ -255,7 +255,7 @@ class _Parser(FormulaSource):
         if getattr(element, field) is not None:
             raise self.error(inner, f"{name} cannot be nested in another {name}")
         if name == "to" and element.kind != self.question:
-            raise self.error(inner, "to needs a question; use ask, mention or answered")
+            raise self.error(inner, "to(...) needs a question: ask(...), mention(...) or answered(...)")
         if name == "returned" and self.skill_of[element.kind].returns != TRUTH_TYPE:
             problem = f"returned needs a skill that returns True or False; {element.kind} does not"
             raise self.error(inner, problem)
@@ -358,7 +358,7 @@ class _Parser(FormulaSource):
 
 
 def no_set(name: str, sets: Iterable[str]) -> str:
-    """Return the error message for an unknown set, with the names of the known sets."""
+    """Return the message for an unknown set of names, with a list of the known sets."""
     known = ", ".join(sets)
     return f"there is no set {name}; " + (f"the sets are {known}" if known else 'list its names under "sets"')
 

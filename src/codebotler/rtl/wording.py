@@ -32,7 +32,7 @@ def describe_action(
 
     Args:
         element: the pattern that an event must match.
-        form: the form of the verb.
+        form: the form of the verb: `base`, `past` or `ing`.
         negated: whether the phrase follows a negation, and so needs `anything`.
         when: a phrase with a leading space; it comes before a clause such as `that nobody is in`.
         where: a phrase after that, such as ` after going to the lobby (step 1)`.

@@ -25,7 +25,7 @@ _STOP_STATES = frozenset({MissionState.STOPPING, MissionState.STOPPED})  # logge
 
 @dataclass(frozen=True)
 class Moment:
-    """A line of the activity list, such as `drives to "kitchen"`, with its time."""
+    """A line of a mission's activity list, such as `drives to "kitchen"`, with its time and kind."""
 
     clock: float  # seconds on the robot's clock since the program began
     kind: str  # the kind of event; for speech, the kind of skill, such as `say`, or `ANSWER`
@@ -34,7 +34,7 @@ class Moment:
 
 @dataclass(frozen=True)
 class Find:
-    """An object or a person that the robot has found."""
+    """An object or a person that the robot has found, and the room."""
 
     room: str  # as named in the program; empty for the starting room
     name: str
@@ -63,7 +63,7 @@ class Progress:
     moments: tuple[Moment, ...] = ()  # the latest entries of the activity list
 
     def after(self, line: LogLine) -> Progress:
-        """Return the progress after an event in the log."""
+        """Return the new progress after an event, given as a line of the log."""
         event = line["event"]
         if event == "state":
             return self.with_state(MissionState(line["state"]), line["clock"])
@@ -135,7 +135,7 @@ class Progress:
         return now
 
     def with_failure(self, event: str) -> Progress:
-        """Return the progress after the skill ended with `error`, `cancelled` or `late` (after a stop)."""
+        """Return the progress after the current skill ended with `event`: error, cancelled or late."""
         recording = _recording(self.skill)
         if recording is not None and recording.is_drive and event != "late":
             return replace(self, room=self.left, is_between=self.is_between or event == "cancelled")

@@ -12,10 +12,7 @@ from codebotler.missions.storage.log import LogLine
 
 
 class SharedView:
-    """Holds the latest view of a session and the events of its mission.
-
-    `changed` is called whenever the view changes, and must return at once.
-    """
+    """Holds a session's latest view and events. `changed`, called after each change, must return at once."""
 
     def __init__(self, view: SessionView, changed: Callable[[], None]) -> None:
         self._view, self._changed = view, changed
@@ -25,14 +22,14 @@ class SharedView:
         self.on_event: Callable[[LogLine], None] = lambda _: None  # an error raised here stops the robot
 
     def wait_until(self, is_met: Callable[[SessionView], bool]) -> SessionView:
-        """Wait until the view meets a condition or the session ends, and return the view."""
+        """Wait until `is_met` accepts the view, or the session ends. Return the latest view."""
         with self._lock:
             self._lock.wait_for(lambda: self._view.is_over or is_met(self._view))
             return self._view
 
     @property
     def view(self) -> SessionView:
-        """The current state of the mission, as page and terminal show it."""
+        """The latest snapshot of the session, which the page and the terminal show."""
         return self._view
 
     @property
@@ -47,7 +44,7 @@ class SharedView:
         return self._mission is not None and self._mission.may_move
 
     def events(self, start: int = 0) -> list[LogLine]:
-        """Return the events of the mission so far, without the first `start` ones."""
+        """Return the events of the mission so far, oldest first, without the first `start` ones."""
         return self._events[start:]
 
     def _add_remark(self, sentence: str) -> None:

@@ -39,7 +39,10 @@ Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking",
 
 @dataclass(frozen=True)
 class MissionOrder:
-    """A request for a mission. Raises UserError if it asks for nothing, or if `past` has an unsure step."""
+    """A request for a mission: an instruction for a model, or a program.
+
+    Raises UserError if both are empty, or if nobody has said whether the last step of `past` happened.
+    """
 
     instruction: str = ""
     model: str = ""  # empty if no model may be asked
@@ -58,7 +61,7 @@ class MissionOrder:
             clean_instruction(self.instruction)
 
     def first_view(self, number: int, rules: tuple[Rule, ...], within: Contract | None) -> SessionView:
-        """Return the first view of session `number`, which will carry out this order."""
+        """Return the view with which session `number` begins. `within` limits what its programs may do."""
         return SessionView(
             number,
             instruction=self.instruction,
@@ -120,17 +123,17 @@ class SessionView:
 
     @property
     def contract(self) -> Contract | None:
-        """The contract that the check derived from the program; None if there is none."""
+        """The upper bound, derived by the check, of what the program may do; None if there is none."""
         return None if self.check is None else self.check.contract
 
     @property
     def rules_in_force(self) -> tuple[Rule, ...]:
-        """The rules that are not switched off."""
+        """The house rules, except those that a person has switched off for this program."""
         return tuple(rule for rule in self.rules if rule.name not in self.disabled_rules)
 
     @property
     def can_run(self) -> bool:
-        """Whether the program can start. It cannot with a syntax error; people can accept other problems."""
+        """Whether the program has no syntax error, so it can start. People can accept other problems."""
         return self.check is None or not any(one.kind in _SYNTAX_ERRORS for one in self.check.problems)
 
     @property
@@ -186,13 +189,13 @@ class SessionView:
 
     @property
     def may_be_asked_again(self) -> bool:
-        """Whether the model can write another program now."""
+        """Whether a person can ask the model for another program now."""
         is_waiting = self.may_be_approved or self.waits_for_program
         return is_waiting and bool(self.instruction and self.model)
 
     @property
     def may_be_edited(self) -> bool:
-        """Whether the program can be replaced now."""
+        """Whether a person can edit the program now. After the session, they edit it for a new mission."""
         if self.is_over or self.is_written:
             return self.is_over
         waits = self.state is None and bool(self.program)  # for the robot; edits are kept until then
@@ -200,5 +203,5 @@ class SessionView:
 
 
 def program_digest(program: str) -> str:
-    """Return the SHA-256 hash of a program, by which an approval names exactly this program."""
+    """Return the SHA-256 hash of a program, in hexadecimal. Approvals name a program by this hash."""
     return hashlib.sha256(program.encode(errors="surrogatepass")).hexdigest()

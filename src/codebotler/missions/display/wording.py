@@ -23,7 +23,7 @@ _STATES_IMPLIED_BY_STOP = frozenset({MissionState.STOPPING, MissionState.STOPPED
 
 
 def event_text(line: LogLine) -> str:
-    """Describe an event, as in `drives to "kitchen"`. Return an empty string for hidden events."""
+    """Return an event in words, such as `drives to "kitchen"`, or "" if people do not see the event."""
     words = _EVENT_WORDERS.get(line["event"])
     return words(line) if words else ""
 
@@ -50,17 +50,17 @@ def _state(line: LogLine) -> str:
 
 
 def stop_text(by: str) -> str:
-    """Describe a stop by its source, such as `stopped by Ctrl-C` or `stopped from the page`."""
+    """Return a stop and its source in words, such as `stopped by Ctrl-C` or `stopped from the page`."""
     return f"stopped {'from' if by == BY_PAGE else 'by'} {visible(by)}"
 
 
 def reason_text(reason: str, line: int | None) -> str:
-    """Return why a mission ended, after the program's line if that is known, as in `line 3: no such room`."""
+    """Return `reason`, after the number of the program's line if known, as in `line 3: no such room`."""
     return reason if line is None else f"line {line}: {reason}"
 
 
 def capitalize(words: str) -> str:
-    """Return a sentence with a capital letter at its beginning."""
+    """Return words with a capital first letter. The other letters stay as they are."""
     return words[:1].upper() + words[1:]
 
 

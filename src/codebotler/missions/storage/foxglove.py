@@ -38,7 +38,7 @@ def frame_transform(at: Point, heading: float, time: int) -> Message:
 
 
 def log_line(level: int, message: str, name: str, line: int | None, time: int) -> Message:
-    """Build a log message. `name`: a skill or event kind; `line`: of the program; `time`: ns since 1970."""
+    """Build a log message. `level`: 1 (debug) to 4; `name`: of a skill or event; `time`: ns since 1970."""
     where = {"file": "", "line": 0} if line is None else {"file": "program.py", "line": line}
     return {"timestamp": _time(time), "level": level, "message": message, "name": name, **where}
 
@@ -62,7 +62,7 @@ def _pose(at: Point, heading: float = 0.0) -> Message:
 
 
 def scene_entity(room: Room, time: int) -> Message:
-    """Build a message with the outline and the name of a room, which has a footprint and a stopping point."""
+    """Build a message that draws a room's outline and name. The room needs a footprint and `stand_at`."""
     assert room.footprint is not None, "rooms are laid out"
     assert room.stand_at is not None, "rooms are laid out"
     outline = {

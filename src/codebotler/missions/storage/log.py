@@ -84,7 +84,7 @@ NEXT_STATES = {
 
 @dataclass
 class MissionSummary:
-    """The summary of a mission, stored beside its log."""
+    """A mission's state, instruction, program, times and other facts, stored in a file beside its log."""
 
     id: str
     state: MissionState
@@ -119,7 +119,7 @@ class MissionSummary:
         return summary
 
     def write(self, folder: Path) -> None:
-        """Replace the summary file atomically."""
+        """Write the summary to its file in the mission's folder, atomically."""
         write_whole(folder / SUMMARY_FILE, json.dumps(asdict(self), indent=1).encode())
 
 
@@ -163,7 +163,7 @@ SKILL_END_EVENTS = frozenset({"result", "error", "cancelled", "late"})
 
 
 def find_skill_end(events: Sequence[LogLine], number: int) -> LogLine | None:
-    """Return the first event with index `number` or later that ends a skill, such as `result`, or None."""
+    """Return the first event from index `number` on that ends a skill, such as `result`, or None."""
     later = (events[at] for at in range(number, len(events)))
     return next((line for line in later if line["event"] in SKILL_END_EVENTS), None)
 

@@ -9,7 +9,7 @@ from codebotler.core.world import Point, Room, World, laid_out
 
 
 def map_data(world: World) -> dict[str, Any]:
-    """Return the data of a `map` event: the rooms with their corners and stopping points, in metres."""
+    """Return the data of a `map` event for a log: rooms with corners and stopping points, in metres."""
     rooms = [
         {
             "name": room.name,
@@ -23,7 +23,7 @@ def map_data(world: World) -> dict[str, Any]:
 
 
 def map_from(data: Mapping[str, Any]) -> World:
-    """Return the world described by a `map` event: only its rooms and the robot's starting room."""
+    """Return the world in a log's `map` event: only its rooms and the robot's starting room."""
     rooms = [
         Room(
             room["name"],

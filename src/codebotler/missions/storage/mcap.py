@@ -49,7 +49,7 @@ _JSON_TYPES = {
 
 
 class TopicMessage(NamedTuple):
-    """A message, its topic, and the name of its schema if it is one of Foxglove's."""
+    """An MCAP message with its topic and, if Foxglove defines its schema, the schema's name."""
 
     topic: str
     message: Message
@@ -64,7 +64,7 @@ def write_mcap(
     folder: Path | None = None,
     clock: TimeSource = "wall",
 ) -> None:
-    """Write a mission with a topic for each skill, and topics for states, the log, poses and the rooms.
+    """Write a mission as MCAP, with topics for each skill, the states, the log, the poses and the rooms.
 
     The program is added as an attachment. Times come from the wall clock, or from the robot's clock, which
     then starts when the mission was created. Pictures are read from `folder`, unless it is None.
@@ -143,7 +143,7 @@ class _RobotPath:
         self._at: Point | None = None
 
     def messages(self, line: LogLine, at: int) -> Iterator[TopicMessage]:
-        """Yield messages if an event contains the map or changes the robot's position."""
+        """Yield messages for the rooms if an event has the map, and for the pose if the robot has moved."""
         if line["event"] == "map":
             self._world = map_from(line)
             rooms = {"entities": [foxglove.scene_entity(room, at) for room in self._world.rooms]}
@@ -165,7 +165,7 @@ class _RobotPath:
 
 
 def schema_of(values: Sequence[Any]) -> dict[str, Any]:
-    """Infer a JSON schema from values. Mixed types become text, because Foxglove has no union types."""
+    """Return a JSON schema for all values. Mixed types become text, as Foxglove has no union types."""
     types = {_json_type(value) for value in values}
     kind = types.pop() if len(types) == 1 else "number" if types == {"integer", "number"} else "string"
     if kind == "object":
@@ -210,7 +210,7 @@ def export_mcap(
     clock: TimeSource,
     folder: Path | None = None,
 ) -> None:
-    """Write a mission to an MCAP file, atomically. Raise UserError if `path` is another kind of file."""
+    """Write a mission to an MCAP file, atomically. Raise UserError if `path` is a file of another kind."""
     expect_replaceable(path, b"\x89MCAP")
     whole = io.BytesIO()
     write_mcap(whole, summary, events, folder=folder, clock=clock)

@@ -37,7 +37,7 @@ DONE_EVENTS = frozenset({"result", "late"})
 
 @dataclass(frozen=True)
 class MissionPast:
-    """The steps of an ended mission and of those that it continued. A new mission can do the rest.
+    """What the robot did in an ended mission and those before it, so that a new one can do the rest.
 
     Args:
         mission: the ID of the ended mission.
@@ -47,7 +47,7 @@ class MissionPast:
         why: why the mission ended, in a sentence.
         trace: what the robot did and saw, with rooms and objects named as in the programs.
         place: where the robot was last; empty if unknown.
-        unsure: a step whose end the log lacks, such as a cancelled `say`, so it may have happened; or None.
+        unsure: a step that may or may not have happened, such as a cancelled `say`; None if there is none.
         before: how many steps of `trace` earlier missions did, before this program.
         has_failed: whether the mission failed, rather than being stopped or interrupted.
         testimony: what people said about unsure steps, in a sentence.
@@ -67,7 +67,7 @@ class MissionPast:
 
     @property
     def is_untouched(self) -> bool:
-        """Whether the robot did and tried nothing, so that the whole program is still to do."""
+        """Whether the robot neither did nor tried anything, so that the whole program can still run."""
         return bool(self.program) and not (self.trace or self.unsure or self.has_failed)
 
     @property
@@ -77,7 +77,7 @@ class MissionPast:
 
     @property
     def progress(self) -> Progress:
-        """The progress with which the new mission begins: the robot's place, its hand, and what it found."""
+        """The progress with which the new mission begins: where the robot is, what it holds and has found."""
         now = Progress()
         for event in self.trace:
             row = by_event(event.kind)
@@ -112,7 +112,7 @@ class MissionPast:
 
     @property
     def unsure_step_text(self) -> str:
-        """A clause that names the unsure step, for a question to a person; empty if there is no such step."""
+        """A clause that tells a person which step may have happened; empty if `unsure` is None."""
         if self.unsure is None:
             return ""
         return f"the robot began this, but the log does not say whether it happened: {self._unsure_words}"
@@ -125,11 +125,11 @@ class MissionPast:
 
     @property
     def answers(self) -> tuple[str, ...]:
-        """The options of the robot's question, if the unsure step is a question; empty otherwise."""
+        """The options of the robot's question, if `unsure` is a question; otherwise empty."""
         return () if self.unsure is None else tuple(option.text for option in self.unsure.options)
 
     def resolve(self, *, happened: bool, answer: str = "") -> MissionPast:
-        """Return the past after a person has said whether the unsure step happened.
+        """Return a copy in which a person has said whether the step `unsure` happened.
 
         Args:
             happened: whether the step happened.
@@ -150,13 +150,13 @@ class MissionPast:
         return replace(self, trace=trace, unsure=None, testimony=testimony)
 
     def add_to(self, room_map: RoomMap | None, place: str) -> tuple[RoomMap, str]:
-        """Return the map with these steps added, and `place`, or the last known place if it is empty."""
+        """Return the map with these steps, and the robot's room: `place` or, if empty, the last known."""
         place = place or self.place
         known = RoomMap((place,), place, guessed=True) if room_map is None else room_map
         return replace(known, start=known.room(place) or known.start, past=self.trace), place
 
     def data(self) -> dict[str, object]:
-        """Return the data of the `past` event that a continuation writes to its log."""
+        """Return the data of the `past` event with which the new mission logs these steps."""
         return {
             "continues": self.mission,
             "why": self.why,
@@ -239,7 +239,7 @@ def _expect_same_map(mission: str, events: Sequence[LogLine], world: World) -> N
     lacks = next((name for name in had if name not in here), None)
     if lacks is not None:
         where = f'ran on another map, with the room "{shortened(lacks)}"'
-        raise UserError(f"mission {mission} {where}; give its --world")
+        raise UserError(f"mission {mission} {where}; give that map with --world")
 
 
 def _repeat(events: Sequence[LogLine], skills: SkillTable, place: str) -> tuple[LoggedRobot, Event | None]:
@@ -310,7 +310,7 @@ class LoggedRobot(SimulatedRobot):
 
 
 def arguments_in(line: LogLine, skills: SkillTable) -> list[Argument]:
-    """Return the arguments of the skill call in a log line."""
+    """Return the arguments of a logged skill call in a robot's types, with tuples for lists."""
     given = zip(skills[line["skill"]].parameters, line["arguments"].values(), strict=True)
     listed = [to_options(value) if parameter.is_options else value for parameter, value in given]
     return [tuple(value) if isinstance(value, list) else value for value in listed]

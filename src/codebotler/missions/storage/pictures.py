@@ -18,14 +18,14 @@ _PICTURE_PATH = re.compile(rf"{PICTURE_FOLDER}/\d+\.(?:{'|'.join(_SIGNATURES)})"
 
 
 class PictureStore:
-    """Stores the pictures of a mission without converting them."""
+    """Stores the pictures of one mission as files in its folder, without converting them."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._count = self._bytes = 0
 
     def keep(self, data: bytes) -> dict[str, str]:
-        """Store a picture. Return its `file` for the event, or a `text` that says why it was not stored."""
+        """Store a picture. Return `{"file": path}` for the event, or `{"text": why}` if it was not stored."""
         kind = next((kind for kind, start in _SIGNATURES.items() if data.startswith(start)), None)
         if kind is None:
             return _explain_loss(f"its {len(data):,} bytes are neither JPEG nor PNG")
@@ -45,7 +45,7 @@ def _explain_loss(why: str) -> dict[str, str]:
 
 
 def read_picture(folder: Path, line: Mapping[str, Any]) -> tuple[str, bytes] | None:
-    """Return the file extension and the bytes of an event's picture, or None if there is none to read."""
+    """Return the extension, such as `jpg`, and the bytes of an event's picture; None if there is none."""
     name = line.get("file")
     if line["event"] != "picture" or not isinstance(name, str) or not _PICTURE_PATH.fullmatch(name):
         return None

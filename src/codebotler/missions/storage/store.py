@@ -30,7 +30,7 @@ _MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d{1,6})?", re.ASCII)
 
 
 def read_missions(home: Path, most: int | None = None) -> list[MissionSummary]:
-    """Read the last `most` summaries, or all, oldest first. Raise UserError if a summary is damaged."""
+    """Read the last `most` mission summaries, or all, oldest first. Raise UserError if one is damaged."""
     folders = _mission_folders(home)[-most if most else 0 :]
     return sorted(map(MissionSummary.read, folders), key=lambda summary: (summary.created, summary.id))
 
@@ -46,7 +46,7 @@ def find_mission(home: Path, name: str) -> Path:
 
 
 def find_rest(folder: Path) -> MissionSummary | None:
-    """Return the latest mission that continued the one in a folder, or None. Skip damaged missions."""
+    """Return the last mission in the chain that continued the one in `folder`, or None. Skip damaged ones."""
     known: list[MissionSummary] = []
     for path in sorted(folder.parent.glob(f"*/{SUMMARY_FILE}")):
         with suppress(UserError, OSError):
@@ -55,7 +55,7 @@ def find_rest(folder: Path) -> MissionSummary | None:
 
 
 def rests_in(known: Sequence[MissionSummary]) -> dict[str, MissionSummary]:
-    """Return a dict from the ID of each continued mission to the mission that ran to continue it."""
+    """Return a dict from the ID of a mission to the mission that continued it, if the latter ran."""
     return {one.continues: one for one in known if one.if_tool_dies and one.continues}
 
 
@@ -90,7 +90,7 @@ def recover_missions(home: Path) -> list[MissionSummary]:
 
 
 def find_interrupted(home: Path) -> list[MissionSummary]:
-    """Call `recover_missions`. Return its missions, and the last that ran if it was interrupted earlier."""
+    """Call `recover_missions`. Return its result, and the last mission that ran if interrupted before."""
     found = recover_missions(home)
     with suppress(UserError):
         ran = [one for one in read_missions(home, RECENT_MISSIONS) if one.if_tool_dies]

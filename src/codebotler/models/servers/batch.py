@@ -28,16 +28,16 @@ STREAM_HEADERS = {"content-type": "text/event-stream"}
 
 @dataclass(frozen=True)
 class BatchRequest:
-    """A request for a batch endpoint."""
+    """A request for a batch endpoint: the path of the endpoint, and the JSON body."""
 
     url: str  # the path of the endpoint, such as `/v1/chat/completions`
     body: Mapping[str, Any]  # as JSON
 
 
 class BatchModel:
-    """A model whose requests and answers are stored in files. It sends nothing and needs no key.
+    """Builds requests for a batch file, and parses the answers later. Sends nothing and needs no key.
 
-    It gives a `ChatModel` or `CompletionsModel` a fake server that stores requests and replays answers.
+    To do so, it gives a `ChatModel` or `CompletionsModel` a fake server inside this process.
     """
 
     def __init__(self, name: str, settings: SamplingSettings) -> None:

@@ -80,7 +80,7 @@ class ChatModel:
         guard_logs()
 
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
-        """Request one reply. Raise ModelError if no complete reply arrives."""
+        """Request reply `number` to a prompt, from 0. Raise ModelError if no complete reply arrives."""
         start = time.monotonic()
         settings = self._request_settings
         if (seed := self.settings.seed_of(number)) is not None:
@@ -318,7 +318,7 @@ def _open_model(name: str, settings: SamplingSettings, http_client: object) -> M
         missing = QUOTED_VARIABLE.search(str(error))
         if missing is None:
             raise opening_error(name, error) from None
-        raise UserError(f"{name} needs the key in {missing[1]}; set it in the environment") from None
+        raise UserError(f"{name} needs an API key; set the environment variable {missing[1]}") from None
 
 
 def _key_variables(provider: str) -> list[str]:

@@ -67,7 +67,7 @@ class CompletionsModel:
         guard_logs()
 
     async def reply(self, prompt: Prompt, *, number: int, on_text: TextListener = ignore_text) -> Reply:
-        """Request one reply. Raise ModelError if no complete reply arrives."""
+        """Request reply `number` to a prompt, from 0. Raise ModelError if no complete reply arrives."""
         start = time.monotonic()
         try:
             async with asyncio.timeout(self.settings.timeout):

@@ -26,12 +26,12 @@ CERTIFICATE_VARIABLES = ("SSL_CERT_FILE", "SSL_CERT_DIR")
 
 
 def byte_limit(max_tokens: int | None) -> int:
-    """Return a generous limit in bytes for a reply with up to `max_tokens` tokens (None if unlimited)."""
+    """Return a generous limit, in bytes, for a reply of up to `max_tokens` tokens (None: any number)."""
     return max(MIN_REPLY_BYTES, BYTES_PER_TOKEN * (max_tokens or ASSUMED_TOKENS))
 
 
 def limit_replies(client: HTTPClient, name: str, limit: int) -> HTTPClient:
-    """Limit the size of each reply to a model's HTTP client, and return the client.
+    """Let an HTTP client accept at most `limit` bytes per reply of the model `name`. Return the client.
 
     The client raises ModelError for a longer reply, a compressed reply (which could expand without limit), a
     redirect (which could send the key to another server), and an error sent as JSON instead of a stream.
@@ -94,13 +94,13 @@ def _limit_stream(stream: Any, name: str, limit: int) -> Any:  # noqa: ANN401 - 
 
 
 def without_proxy(url: str | None) -> AbstractContextManager[None]:
-    """Return a context for creating an HTTP client that uses no proxy if `url` is on this machine."""
+    """Return a context in which new HTTP clients use no proxy if `url` is on this machine."""
     is_local = url is not None and _is_loopback(urlsplit(url).hostname or "")
     return hide_variables([name for name in os.environ if is_local and name.lower().endswith("_proxy")])
 
 
 def mention_proxy(error: ModelError, url: str | None) -> ModelError:
-    """Name the proxy that requests to `url` use, if any, in the error's sentence. Return the same error."""
+    """Add the proxy that requests to `url` use, if any, to the error's sentence. Return the same error."""
     parts = urlsplit(url or "https://provider.invalid")
     host = parts.hostname or ""
     proxies = getproxies()
@@ -123,7 +123,7 @@ def _is_loopback(host: str) -> bool:
 
 
 def opening_error(name: str, error: Exception) -> UserError:
-    """Build the error for a client that cannot be created, for example because of a wrong proxy."""
+    """Build the error for a model whose HTTP client cannot be created, for example with a wrong proxy."""
     for variable in CERTIFICATE_VARIABLES:
         if (path := os.environ.get(variable)) and not Path(path).exists():
             return UserError(f"{name} cannot be used: {variable} names {path}, which does not exist")

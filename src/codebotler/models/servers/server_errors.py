@@ -37,7 +37,7 @@ RETRYABLE_WORDS = re.compile(
 
 
 def model_error(name: str, fault: str | Exception, *, is_temporary: bool) -> ModelError:
-    """Build a model's error from a sentence, or from an exception and its original cause."""
+    """Build the error of the model `name` from a sentence, or from an exception and its first cause."""
     first: BaseException | None = fault if isinstance(fault, Exception) else None
     while first and first.__cause__:
         first = first.__cause__
@@ -80,7 +80,7 @@ def timeout_error(name: str, seconds: float) -> ModelError:
 def status_error(
     name: str, status: int, body: object, *, retry_after: float | None = None, is_permanent: bool = False
 ) -> ModelError:
-    """Build the error for a status of 400 or more. A permanent error is not retried, whatever its status."""
+    """Build the error for an HTTP status of 400 or more. `is_permanent` means that retries are useless."""
     message = f" ({text})" if (text := error_text(body)) else ""
     sentence = f"{name}: the server answered with status {status}{message}{STATUS_HINTS.get(status, '')}"
     is_temporary = not is_permanent and (status >= SERVER_ERROR or status in RETRYABLE_STATUSES)
@@ -89,7 +89,7 @@ def status_error(
 
 
 def error_in_reply(name: str, body: object) -> ModelError:
-    """Build the error for an error body that a server sent with a success status."""
+    """Build the error for a server that reports an error in `body`, but with a status of success."""
     fields = body if isinstance(body, Mapping) else {}
     code = next((fields[key] for key in ("code", "status") if fields.get(key)), None)
     if str(code).isdigit() and int(str(code)) > SUCCESS:
@@ -100,12 +100,12 @@ def error_in_reply(name: str, body: object) -> ModelError:
 
 
 def is_filtered(status: int | None, body: object) -> bool:
-    """Return whether the server rejected a request because of a content filter."""
+    """Return whether an HTTP status and body say that a content filter rejected the request."""
     return status in {*PROMPT_STATUSES, FORBIDDEN} and FILTER_WORDS.search(str(body)) is not None
 
 
 def error_text(body: object) -> str:
-    """Return the error message of a server or a library as one short line without keys."""
+    """Return the message in a server's JSON, a text or an exception, as one short line without keys."""
     text = next(_messages(body), None) or ("" if body is None else str(body))
     return brief(redact(text), MAX_ERROR_CHARACTERS).rstrip(".")
 

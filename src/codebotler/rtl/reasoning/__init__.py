@@ -25,7 +25,7 @@ __all__ = [
 
 
 def is_satisfiable(*formulas: Formula) -> bool:
-    """Whether some trace satisfies all formulas."""
+    """Whether some trace satisfies all formulas. Raise Undecided if the search would take too long."""
     return Reasoner(formulas).trace(formulas) is not None
 
 
@@ -35,7 +35,7 @@ def satisfying_trace(*formulas: Formula) -> Trace | None:
 
 
 def conflict(*formulas: Formula) -> list[Formula] | None:
-    """Return a minimal subset of formulas that contradict each other, or None if all can hold."""
+    """Return a minimal subset of formulas that contradict each other, or None if all can hold together."""
     return Reasoner(formulas).conflict(formulas)
 
 

@@ -77,7 +77,7 @@ def alphabet(
 
 
 def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
-    """Split a pattern into four that must all match: texts, result, room, and held object with addressee."""
+    """Split a pattern into four: texts, answer or result, room, held object or addressee. All must match."""
     kind = element.kind
     return (
         EventPattern(kind, element.text, element.options, element.mention, more=element.more),

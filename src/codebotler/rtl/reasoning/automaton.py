@@ -31,7 +31,7 @@ class Automaton:
     @classmethod
     @lru_cache(maxsize=1_000)  # worlds of a task share most requirements
     def of(cls, formula: formulas.Formula, letters: tuple[Letter, ...]) -> Automaton:
-        """Build the minimal automaton of a formula over these letters."""
+        """Build a formula's minimal automaton for events with these `letters`, or raise Undecided."""
         machine = machine_of(formula)
         number: dict[AutomatonState, int] = {machine.start: 0}
         rows: list[list[int]] = []
@@ -69,7 +69,7 @@ class Automaton:
 
     @cached_property
     def distances(self) -> tuple[int | None, ...]:
-        """For each state, the least number of events to an accepting state; None if there is no way."""
+        """For each state, after how many events the formula can first hold; None if it never can."""
         found: list[int | None] = [0 if accepted else None for accepted in self.accepts]
         distance, border = 0, {s for s, accepted in enumerate(self.accepts) if accepted}
         while border:

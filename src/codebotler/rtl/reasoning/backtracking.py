@@ -27,7 +27,7 @@ class RepeatedText(NamedTuple):
     suffix: str = ""
 
     def of(self, size: int) -> str:
-        """Return the text with `size` characters before the suffix."""
+        """Return the text with the unit repeated so that `size` characters come before the suffix."""
         return (self.prefix + self.unit * (size // len(self.unit) + 1))[:size] + self.suffix
 
 
@@ -47,7 +47,7 @@ def is_slow(
     sizes: Sequence[int] = (*SHORT_SIZES, *LONG_SIZES),
     seconds: float = SLOW_SECONDS,
 ) -> bool:
-    """Whether a function takes more than `seconds` of processor time for a string of any of the sizes."""
+    """Whether `read` takes more than `seconds` of processor time on the text in one of the `sizes`."""
     for size in sizes:
         duration = _measure(read, text.of(size))
         if duration > seconds and _measure(read, text.of(size)) > seconds:  # the machine may be busy
@@ -59,7 +59,7 @@ def is_slow(
 
 @cache
 def texts_to_try(pattern: str) -> list[RepeatedText]:
-    """Return texts on which a regex may be slow, always the same ones; none if the regex repeats nothing."""
+    """Return texts on which a regex may be slow, the same each time; empty if it has no repetition."""
     tree = parse_tree(pattern)
     if "REPEAT" not in str(tree):
         return []

@@ -20,9 +20,9 @@ _MOST_ALIKE = 2
 
 @cache
 def distinct_strings(texts: tuple[TextPattern, ...], *, outer: bool = False) -> tuple[str, ...]:
-    """Generate strings, and return a short one for each set of patterns that a string can match together.
+    """Return short strings, one for each combination of the patterns `texts` that one string can match.
 
-    `outer` allows outer spaces, which options may have but texts of events may not.
+    `outer` allows spaces at the ends, which options may have but texts of events may not.
     """
     found: dict[tuple[bool, ...], str] = {}
     for candidate in _candidates(texts, outer=outer):
@@ -32,7 +32,7 @@ def distinct_strings(texts: tuple[TextPattern, ...], *, outer: bool = False) -> 
 
 @cache
 def can_match(text: TextPattern, *, outer: bool = False) -> bool:
-    """Whether a generated string matches a pattern; if not, other strings may match it."""
+    """Whether one of our generated strings matches a pattern. If False, another string may still match."""
     return any(map(text.matches, _candidates((text,), outer=outer)))
 
 

@@ -55,7 +55,7 @@ class Reasoner:
 
         Args:
             formulas: the formulas that should hold.
-            denied: a formula that should fail; if this is a contradiction, the subset implies the formula.
+            denied: a formula that should fail. If it cannot fail, the returned subset implies this formula.
 
         Raises:
             Undecided: the search would take too long.
@@ -79,7 +79,7 @@ class Reasoner:
     def trace(
         self, formulas: Iterable[Formula], *, always: Iterable[Formula] = (), shortest: bool = False
     ) -> Trace | None:
-        """Return a trace of events of the alphabet on which formulas hold, or None if there is none.
+        """Return a trace, made of `self.events`, on which all formulas hold, or None if there is none.
 
         Args:
             formulas: the formulas that must hold.

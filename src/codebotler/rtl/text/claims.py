@@ -127,7 +127,7 @@ def _numbers_of_thing(marks: list[Mark]) -> Iterator[float]:
 class Time(Matcher):
     """Matches texts that name times of day, all of them between `start` and `end`.
 
-    A time that may be morning or afternoon counts as between them if one of the two is.
+    A time such as `3`, which may mean 3:00 or 15:00, counts if one of the two is between them.
 
     Args:
         start: the earliest time, such as `11:00`.

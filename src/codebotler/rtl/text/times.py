@@ -47,7 +47,7 @@ _DAY = 24 * 60
 
 @lru_cache(maxsize=1024)  # several formulas read the same text
 def times_in(text: str) -> tuple[tuple[TimeOfDay, ...], ...]:
-    """Return the times of day in a string, in minutes: `at 3` gives `((180, 900),)`, 3 am or 3 pm.
+    """Return a text's times, in minutes since midnight: `at 3`, which is 3 am or pm, gives `((180, 900),)`.
 
     `12 pm`, `12:00`, `noon`, `twelve o'clock`, `half past twelve` and `six in the evening` are times, and so
     is a string such as `12` or `at 12` without other words. `before 12 pm` is not a time.
