@@ -88,14 +88,14 @@ class RosRobot(RosCaller):
             values |= _place_values(connection.places, str(arguments[0]))
         call = connection.calls.get(skill)
         if call is None:
-            raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
+            raise RobotError("SkillWithoutAction", f"the skill {skill} declares no ROS action; add one to it")
         request = {"do": "perform", "skill": skill, "fields": call.fields(values)}
         result: RobotResult = call.answer(self._request(call, request, feedback))
         return result
 
     @property
     def failed_stop(self) -> str:
-        """A message if the robot moves some seconds after a stop; "" if it is still or reports nothing."""
+        """A warning if the robot still moves a few seconds after a stop, or "" if no report shows that."""
         worker, until = self._worker, time.monotonic() + self._waits.patience * 0.8
         if worker is None or not (self.connection.pose or self.connection.velocity):
             return ""
@@ -105,7 +105,7 @@ class RosRobot(RosCaller):
         return f"the robot was told to stop but is still moving: {STOP_BY_HAND}" if motion.is_moving else ""
 
     def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
-        """Pass positions in metres (None if unknown) to `on_pose` until `disconnect`. Return `has_pose`."""
+        """Pass positions in metres (or None) to `on_pose` until `disconnect`. Return False without poses."""
         worker = self._worker
 
         def watch() -> None:
