@@ -106,7 +106,7 @@ def read_places(source: object, at: YamlFile) -> Places:
         file = YamlFile.read(Path(at.name).parent / mapping.file)
         frames.append(file.validate(PlacesFile).frame if isinstance(one, str) else mapping.frame)
         if frames[-1] != frames[0]:
-            raise at.wrong(f'the frame is "{frames[-1]}" here, but "{frames[0]}" above; use only one', *here)
+            raise at.wrong(f'the frame is "{frames[-1]}" here, but "{frames[0]}" above; use the same', *here)
         entries = [*_find_entries(mapping, file.data)]
         if not entries:
             sentence = f'"{mapping.each}" matches no named place in {file.name}'

@@ -131,13 +131,13 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
-        """Begin a mission, and prepare its program in the background. Status 409: another mission runs."""
+        """Begin a mission, and prepare its program in the background. Status 409 if another one runs."""
         session = console.begin(MissionOrder(new.instruction, new.model, new.program))
         return await _begun_data(console, session)
 
     @api.post("/missions/{mission}/continue", status_code=201)
     async def continue_mission(mission: str, form: ContinueForm) -> dict[str, Any]:
-        """Begin a mission for the rest of another one. If that has no instruction, edit the program."""
+        """Begin a mission for the rest of another. A person edits its program if there is no instruction."""
         summary, _ = await asyncio.to_thread(_read_mission, console, mission)
         past = await asyncio.to_thread(console.past_of, summary.id)
         if form.happened is not None:

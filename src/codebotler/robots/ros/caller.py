@@ -214,7 +214,7 @@ class RosCaller:
 
 
 def calls_data(connection: Connection) -> WorkerMessage:
-    """Return for each skill its call's kind, server, type and definition, in the form for a worker."""
+    """Return for each skill its call's kind, server, type and definition, as data for a worker."""
     return {
         skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
         for skill, call in connection.calls.items()

@@ -85,7 +85,7 @@ def choose_python(named: Path = ROS_PYTHON) -> Path:
 
 
 def ros_readiness(name: str, python: Path = ROS_PYTHON) -> Readiness:
-    """Check whether `python` has the modules for `name`, ros1 or ros2, but not the message types."""
+    """Check whether `python` can run the worker for `name` (ros1 or ros2), without the message types."""
     if name == "ros1":
         needs: Sequence[str] = ROS1_MODULES
         mend, see = INSTALL_ROS1, "needs a master, see ROS_MASTER_URI"

@@ -88,7 +88,7 @@ class RosRobot(RosCaller):
             values |= _place_values(connection.places, str(arguments[0]))
         call = connection.calls.get(skill)
         if call is None:
-            raise RobotError("SkillWithoutAction", f"the skill {skill} declares no ROS action; add one to it")
+            raise RobotError("SkillWithoutAction", f"the declaration of {skill} has no ROS action; add one")
         request = {"do": "perform", "skill": skill, "fields": call.fields(values)}
         result: RobotResult = call.answer(self._request(call, request, feedback))
         return result
@@ -105,7 +105,7 @@ class RosRobot(RosCaller):
         return f"the robot was told to stop but is still moving: {STOP_BY_HAND}" if motion.is_moving else ""
 
     def watch(self, on_pose: Callable[[Point | None], None]) -> bool:
-        """Pass positions in metres (or None) to `on_pose` until `disconnect`. Return False without poses."""
+        """Pass positions in metres (None if unknown) to `on_pose` until `disconnect`. Return `has_pose`."""
         worker = self._worker
 
         def watch() -> None:

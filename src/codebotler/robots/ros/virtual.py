@@ -72,7 +72,7 @@ class VirtualRobot:
         self._ended = threading.Event()
 
     def start(self) -> bool:
-        """Offer the skills. Return whether a ROS master was started. Raise NotReadyError without ROS."""
+        """Offer the skills. Return whether a ROS master was started. Raise NotReadyError if it lacks ROS."""
         worker = self._worker = self._start_servers()
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)

@@ -95,7 +95,7 @@ class SkillWorker:
         if running and running not in {server.name for server in self.servers.values()}:
             raise SetupError(
                 f"CodeBotler was killed while {running} had a goal, which this connection cannot cancel; "
-                f"use the connection from before, or stop the robot by hand and delete {self._sign}"
+                f"connect with the same options as before, or stop the robot by hand and delete {self._sign}"
             )
         self._listen(start)
         missing = self.missing()
@@ -108,7 +108,7 @@ class SkillWorker:
         self.channel.send("ready", missing=missing, cancelled_all=cancelled_all)
 
     def connect(self, start: Fields) -> bool:
-        """Join ROS and set `graph` and `servers`. Return whether a dead worker left its node behind."""
+        """Connect to ROS and set `graph` and `servers`. Return whether a dead worker left its node behind."""
         raise NotImplementedError
 
     def send(self, goal: Goal, fields: Fields) -> None:

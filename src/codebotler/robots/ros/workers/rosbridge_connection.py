@@ -34,7 +34,7 @@ RECALLED = 7
 
 @dataclass(frozen=True)
 class GoalUpdate:
-    """A goal's new status, feedback or end. If `goal` is empty, it only shows that the server is alive."""
+    """A goal's new status, feedback or end. With an empty `goal`, the update only shows a live server."""
 
     goal: str  # the goal id, or an empty string
     what: str  # status (which implies that the server has accepted the goal), feedback or ended
@@ -137,7 +137,7 @@ ActionProtocol: TypeAlias = Ros1Protocol | Ros2Protocol
 
 
 class RosbridgeConnection:
-    """A connection to a rosbridge. Its thread passes goal updates to `hear`, and calls `lost` if lost."""
+    """A rosbridge connection. Its thread passes goal updates to `hear`, and calls `lost` if it breaks."""
 
     def __init__(
         self,
