@@ -154,7 +154,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     try:
         SkillCall("topic", "", "", request).fields(dict.fromkeys(known, ""))
     except (AttributeError, TypeError):
-        sentence = 'a field, such as "x", also has fields of its own, such as "x.y"; keep one of the two'
+        sentence = 'a path, such as "x", has a value and also subfields, such as "x.y"; keep one of the two'
         raise file.wrong(sentence, *at, MESSAGE_KEYS[kind]) from None
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
     whole, ros = _full_type(kind, form.type), skill.ros

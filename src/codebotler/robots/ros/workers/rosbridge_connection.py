@@ -34,7 +34,7 @@ RECALLED = 7
 
 @dataclass(frozen=True)
 class GoalUpdate:
-    """A goal's new status, feedback or end. With an empty `goal`, the update only shows a live server."""
+    """A goal's new status, feedback or end. An empty `goal` means only that the server is alive."""
 
     goal: str  # the goal id, or an empty string
     what: str  # status (which implies that the server has accepted the goal), feedback or ended
