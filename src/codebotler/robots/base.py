@@ -29,7 +29,7 @@ ROS_PYTHON = Path("/usr/bin/python3")
 
 @dataclass(frozen=True)
 class CameraPicture:
-    """A camera picture that the robot sent."""
+    """A camera picture that the robot sent: `data` holds a JPEG or PNG file, not yet validated."""
 
     data: bytes  # the contents of a JPEG or PNG file, not yet validated
 
@@ -55,7 +55,7 @@ class Robot(Protocol):
 
     @property
     def if_tool_dies(self) -> str:
-        """A clause on the robot's behaviour if this process is killed, such as `the robot ended as well`."""
+        """What happens to the robot if this process is killed, such as `the robot ended as well`."""
 
     @property
     def rooms_are_regexes(self) -> bool:
@@ -78,10 +78,9 @@ class Robot(Protocol):
         """The clock that times a program's sleeps."""
 
     def connect(self) -> None:
-        """Prepare the robot: it stands still, its clock shows 0. Call this first, and again after `cancel`.
+        """Make the robot ready, with its clock at 0. Call this first, and again after each `cancel`.
 
-        Raises:
-            NotReadyError: the robot cannot be used. All resources have been released.
+        Raise NotReadyError, and release all resources, if the robot cannot be used.
         """
 
     def perform(
@@ -135,7 +134,7 @@ class CancelledError(Exception):
 
 @dataclass(frozen=True)
 class Readiness:
-    """Says whether one kind of robot can be used on this machine, and what is missing if not."""
+    """Says whether a kind of robot, such as ros2, works on this machine, or else how to make it work."""
 
     name: str  # the kind: sim, pyrobosim, ros1, rosbridge or ros2
     works: bool  # whether all requirements are installed; the robot itself is not contacted
@@ -146,7 +145,7 @@ class Readiness:
 
 @dataclass(frozen=True)
 class Options:
-    """Options for opening a robot. Each kind of robot ignores the options that it does not need."""
+    """Options for opening a robot, such as its world or address. Each kind of robot uses only some."""
 
     world: World | None = None  # the world of a simulated robot
     speed: float | None = 1.0  # clock seconds per real second; None to skip all waits

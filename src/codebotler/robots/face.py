@@ -40,7 +40,7 @@ class FaceSentence:
 
 @dataclass(frozen=True)
 class FaceQuestion:
-    """A question that the robot asked. An answer must give the question's number."""
+    """A question that the robot asked, with its number, its options, its deadline and any answer."""
 
     number: int
     person: str
@@ -91,7 +91,7 @@ class Face:
             self._add_screens(-1)
 
     def open(self) -> None:
-        """Begin a new mission with an empty face. Until `withdraw`, the robot can say and ask something."""
+        """Clear the face for a new mission. The robot can speak and ask until `withdraw` is called."""
         with self._lock:
             self._is_open = True
             self._show(FaceState())
@@ -103,7 +103,7 @@ class Face:
             self._end("withdrawn")
 
     def say(self, text: str) -> None:
-        """Show a sentence, or raise CancelledError if the mission has been stopped."""
+        """Show a sentence on all screens. Raise CancelledError if the mission has been stopped."""
         with self._lock:
             said = FaceSentence(self._next(), text)
             self._show(replace(self.shown, said=(*self.shown.said, said)[-MAX_SENTENCES:]))
@@ -133,7 +133,7 @@ class Face:
         return ended.answer
 
     def answer(self, number: int, option: int) -> None:
-        """Answer question `number` with the index of an option. Raise AnswerError if late or invalid."""
+        """Answer question `number` with an option's index. Raise AnswerError if that is late or invalid."""
         with self._lock:
             question = self.shown.question
             if question is None or question.number != number:
@@ -175,7 +175,7 @@ def _speech_of(skill: Skill) -> Recording | None:
 
 
 class RobotWithFace:
-    """Wraps a robot so that a face performs the spoken skills, and the robot all other skills."""
+    """Wraps a robot so that a face performs spoken skills, such as `say`, and the robot all others."""
 
     def __init__(self, robot: Robot, face: Face, skills: SkillTable = SKILLS) -> None:
         self._robot, self._face, self.skills = robot, face, skills
@@ -185,7 +185,7 @@ class RobotWithFace:
 
     @property
     def missing(self) -> Mapping[str, str]:
-        """Maps each skill that the wrapped robot lacks to the reason. Spoken skills are not included."""
+        """Maps each skill that the wrapped robot lacks to the reason, without the spoken skills."""
         return {
             skill: why for skill, why in self._robot.missing.items() if _speech_of(self.skills[skill]) is None
         }

@@ -70,7 +70,7 @@ def open_with_face(name: str, options: Options, face: Face) -> Robot:
 
 
 def list_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:
-    """Return for each kind of robot whether it can be used here. `ros_python` is the Python that has ROS."""
+    """Check which kinds of robots work on this machine. `ros_python` is the interpreter that has ROS."""
     return [_readiness(name, ros_python) for name in ROBOT_KINDS]
 
 
@@ -103,7 +103,7 @@ class SpellingRobot:
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Perform a skill with names as the robot spelled them before. Return composed names (NFC)."""
+        """Perform a skill, with names spelled as the robot does. Return a result in composed form (NFC)."""
         given = [self._spellings.get(one, one) if isinstance(one, str) else one for one in arguments]
         result = self._robot.perform(skill, given, feedback)
         for text in result if isinstance(result, list) else [result]:

@@ -50,7 +50,7 @@ class OwnRobot:
         options: the options for opening the robot.
 
     Attributes:
-        failed_stop: why the robot could not be stopped, or "" if it was stopped.
+        failed_stop: why the last stop failed, or "" if it succeeded or there was none.
 
     Raises:
         UserError: the file or class does not exist, or a required method is missing.
@@ -151,7 +151,7 @@ class OwnRobot:
         raise CancelledError
 
     def cancel(self) -> None:
-        """Cancel a running async method, and call the object's `stop` unless it is being called already."""
+        """Call the object's `stop`, wait up to 5 s for its end, and cancel a running async method."""
         with self._stop_lock:
             self._stopped = True
             if self._stop_returned.is_set():

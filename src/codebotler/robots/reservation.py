@@ -24,10 +24,10 @@ LOOPBACK_ADDRESS, LOCKS_IN = "127.0.0.1", Path("/tmp")  # noqa: S108 - a private
 
 
 class Reservation:
-    """A context manager that locks and connects a robot.
+    """A context manager that locks and connects a robot, and disconnects and unlocks it at the end.
 
     For a robot with an address, the lock excludes all other processes of this user on this machine. Without
-    an address, it excludes missions in the same folder. The lock is released when this process ends.
+    an address, it excludes missions in the same folder. The lock ends with this process at the latest.
 
     Args:
         robot: the robot, not yet connected.
@@ -86,7 +86,7 @@ class Reservation:
             holder = os.pread(self._lock, 1_000, 0).decode(errors="replace")
             raise NotReadyError(
                 f"another tool ({holder or 'just started'}) has a mission open with the robot "
-                f"{self.robot.name}; wait until it has ended, or stop it there"
+                f"{self.robot.name}; wait until that mission has ended, or stop it there"
             ) from None
         os.truncate(self._lock, 0)
         holder = f"process {os.getpid()}, since {datetime.now().astimezone():%H:%M:%S}"
@@ -94,18 +94,13 @@ class Reservation:
 
 
 def robot_file(robot: str, address: str, kind: str) -> Path:
-    """Return the path of this user's file about a robot. `robot` is its kind, `kind` is a suffix: `lock`."""
+    """Return the path of a user's file for a robot of kind `robot`. `kind` is a suffix, such as lock."""
     digest = sha256(normalize_address(address).encode(errors="surrogatepass")).hexdigest()
     return lock_folder() / f"{robot} {digest}.{kind}"
 
 
 def lock_folder() -> Path:
-    """Return the folder of this user's locks on this machine, creating it if necessary.
-
-    Raises:
-        NotReadyError: other users can write to the folder.
-        OSError: the folder cannot be created.
-    """
+    """Return (and create) this user's folder for locks. Raise NotReadyError if others can write to it."""
     # No variable chooses it, since clients of agents start their servers without those of a shell, and it is
     # not below /run/user, which begins and ends with logins.
     folder = LOCKS_IN / f"codebotler-{os.getuid()}"
@@ -113,7 +108,7 @@ def lock_folder() -> Path:
         folder.mkdir(mode=0o700)
     if not _is_ours(folder):
         raise NotReadyError(
-            f"{folder} holds robot locks, but is not a folder that only you can write to; remove it"
+            f"{folder}, which holds robot locks, must be a folder that only you can write to; remove it"
         )
     return folder
 

@@ -134,7 +134,7 @@ class Simulated:
 
 
 def perform_at_once(robot: SimulatedRobot, skill: str, arguments: Sequence[RobotArgument]) -> RobotResult:
-    """Perform a skill in the simulator without delays. For a question, return the chosen option."""
+    """Perform a skill in the simulator without delays. For a question, return the chosen option's text."""
     taken = robot.skills[skill].parameters
     given = [
         tuple(Option(str(text)) for text in a) if parameter.is_options and isinstance(a, tuple) else a

@@ -56,7 +56,7 @@ class NewProgram(_Form):
 
 
 class Approval(_Form):
-    """A person's approval of a program."""
+    """A person's approval of a program, given by its digest, and of the problems and rules to ignore."""
 
     program: str = Field(description="The digest of the reviewed program.", examples=["3f5a8b0c9d21e467"])
     despite_problems: bool = False
@@ -75,7 +75,7 @@ class AnswerForm(_Form):
 
 
 class AskAgainForm(_Form):
-    """A request that the model write another program."""
+    """A request for another program by the model, perhaps with a new token limit."""
 
     repair: bool = Field(default=False, description="Whether to send the program and its problems.")
     max_tokens: Annotated[int, Field(ge=0)] = Field(
@@ -84,7 +84,7 @@ class AskAgainForm(_Form):
 
 
 class ContinueForm(_Form):
-    """A request to do the rest of a mission that ended early."""
+    """A request to do the rest of a mission that ended early, and whether its last step happened."""
 
     happened: bool | None = Field(
         None, description="A person's word on whether the last step happened, if the log does not say so."
@@ -126,18 +126,18 @@ def router(console: Console) -> APIRouter:
 def _add_missions(api: APIRouter, console: Console) -> None:
     @api.get("/missions")
     def list_missions() -> list[dict[str, Any]]:
-        """List all missions, oldest first."""
+        """Return the summaries of all missions, oldest first."""
         return [asdict(summary) for summary in read_missions(console.home)]
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
-        """Begin a mission, unless another one runs, and prepare its program in the background."""
+        """Begin a mission, and prepare its program in the background. Status 409 if another one runs."""
         session = console.begin(MissionOrder(new.instruction, new.model, new.program))
         return await _begun_data(console, session)
 
     @api.post("/missions/{mission}/continue", status_code=201)
     async def continue_mission(mission: str, form: ContinueForm) -> dict[str, Any]:
-        """Begin a mission for the rest of another one. Without an instruction, replace its program then."""
+        """Begin a mission for the rest of another. A person edits its program if there is no instruction."""
         summary, _ = await asyncio.to_thread(_read_mission, console, mission)
         past = await asyncio.to_thread(console.past_of, summary.id)
         if form.happened is not None:
@@ -147,7 +147,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.get("/missions/{mission}")
     def show(mission: str) -> dict[str, Any]:
-        """Return a mission's summary, given its ID. For the current mission, also return its check."""
+        """Return a mission's summary by its ID. For the current mission, return its check and more."""
         view = console.view
         if mission in {_CURRENT, view.id}:
             return view_data(view)
@@ -155,7 +155,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.get("/missions/{mission}/events.jsonl")
     def jsonl(mission: str) -> Response:
-        """Download the events as JSON lines."""
+        """Download a mission's events as JSON lines."""
         summary, _ = _read_mission(console, mission)
         data = (console.home / "missions" / summary.id / EVENTS_FILE).read_bytes()
         return _file(data[: data.rfind(b"\n") + 1], f"{summary.id}.jsonl", "application/jsonl")
@@ -165,7 +165,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
         mission: str,
         clock: Annotated[Literal["wall", "robot"], Query(description="`robot` for simulated time.")] = "wall",
     ) -> Response:
-        """Download the events as MCAP, for Foxglove."""
+        """Download a mission's events as an MCAP file, for Foxglove."""
         with installed():
             from codebotler.missions.storage.mcap import write_mcap  # noqa: PLC0415 - part of an optional extra
 
@@ -179,7 +179,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 def _add_changes(api: APIRouter, console: Console) -> None:
     @api.put("/missions/{mission}/program")
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
-        """Replace the program, and check it in the background."""
+        """Replace the mission's program, and check the new one in the background."""
         _current_session(console, mission)
         return view_data(console.edit(new.program).view)
 
@@ -192,7 +192,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/answer", status_code=202)
     def answer(mission: str, given: AnswerForm) -> dict[str, Any]:
-        """Answer the mission's `question`: say which of its behaviours is meant."""
+        """Answer the mission's `question`, which asks which of several behaviours is meant."""
         session = _current_session(console, mission)
         chosen = given.answer if isinstance(given.answer, str) else given.answer - 1
         session.answer(session.view.question, chosen, given.more)
@@ -200,7 +200,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/approve")
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
-        """Run exactly the program that the person reviewed."""
+        """Run the program that a person has reviewed, and no other one."""
         session = _current_session(console, mission)
         session.approve(
             approval.program,
@@ -222,7 +222,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.get("/missions/{mission}/events", response_class=StreamingResponse)
     async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:
-        """Stream the events as server-sent events, from the beginning or after `Last-Event-ID`."""
+        """Stream the mission's events as server-sent events, from the first or after `Last-Event-ID`."""
         return StreamingResponse(
             _stream(console, _current_session(console, mission), last_event_id),
             media_type="text/event-stream",
@@ -233,7 +233,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: NewProgram) -> dict[str, Any]:
-        """Check a program and the house rules, in the rooms of the current mission if there is one."""
+        """Check a program, also against the house rules, in the rooms of the current mission, if any."""
         return console.check(new.program, console.view.room_map, console.rules).data()
 
     @api.get("/robot", tags=["robot"])

@@ -48,8 +48,8 @@ CLEANUP_SECONDS = 2.0  # the time limit for ending a mission if its program has 
 class Console:
     """Begins, changes and stops the missions of one robot, for the page, for agents and for the terminal.
 
-    Any thread may use it. Only missions connect the robot. The first of the `models` is the default. `within`
-    is the most that any program may do. A model writes `candidates` programs for an instruction. If a skill
+    Any thread may use it. Only missions connect the robot. The first of the `models` is the default. No
+    program may do more than `within`. A model writes `candidates` programs for an instruction. If a skill
     fails, a model may write a program for the rest of the mission, `recoveries` times in a row.
     """
 
@@ -122,12 +122,12 @@ class Console:
 
     @property
     def view(self) -> SessionView:
-        """The view of the current mission, or else of the last one; empty before the first."""
+        """What viewers see of the current mission, or else of the last one; empty before the first."""
         session = self.session
         return SessionView() if session is None else session.view
 
     async def view_once(self, *, over: bool) -> SessionView:
-        """Wait at most 15 s until the mission is over, or has begun if `over` is false. Return the view."""
+        """Wait up to 15 s until the mission is over or, if `over` is false, has begun. Return its view."""
         await self.notifier.until(lambda: self.view.is_over == over, MAX_WAIT_SECONDS)
         return self.view
 
@@ -136,7 +136,8 @@ class Console:
     ) -> MissionSession:
         """Begin a mission, by default with the first model. Raise MissionError while another mission runs.
 
-        With `by_agent`, the notice about interrupted missions stays, so that a person still sees it.
+        With `by_agent`, the notice about interrupted missions stays, so that a person still sees it. With
+        `after`, also raise MissionError if STOP was pressed or a mission began since that session.
         """
         noticed = self.interrupted if by_agent else ()
         session = self._begin(order, after=after)
@@ -160,7 +161,7 @@ class Console:
             if before is not None and before.view.is_running:
                 raise MissionError(f"mission {before.view.id} is {before.view.state}; stop it first")
             if after is not None and after is not self._may_recover:
-                raise MissionError("somebody pressed STOP, or began another mission")
+                raise MissionError("somebody pressed STOP or began another mission, so nothing was begun")
             if self._stopping.is_alive():
                 raise MissionError("the robot has not answered a stop request yet; check the robot")
             if before is not None and before.is_stuck:
@@ -199,7 +200,7 @@ class Console:
     def rest_of(
         self, past: MissionPast, program: str = "", author: str = "", *, model: str = ""
     ) -> MissionOrder:
-        """Return an order for the rest of a mission. Without a program, reuse its own or ask a model.
+        """Return an order to do the rest of a mission. Without `program`, reuse its own or ask a model.
 
         `model` is the name of the model to ask, or "" for the one that wrote the mission's program.
         """
@@ -214,10 +215,10 @@ class Console:
         return MissionOrder(past.instruction, model, program, author, past=past)
 
     def ask_evidence(self, past: MissionPast, remark: Callable[[str], None]) -> list[str]:
-        """Return what helps a person to say whether an unsure step happened. A STOP reaches the robot."""
+        """Return sentences that help a person to decide whether the step `past.unsure` happened."""
         with self._lock:
             if self._asking is not None:
-                raise MissionError("the robot is being asked already")
+                raise MissionError("the robot is already being asked what happened; wait for its answer")
             self._asking = button = StopButton()
         try:
             return ask_evidence(self.robot, self.home, past, remark, button)

@@ -114,7 +114,7 @@ def warn(sentence: str, seconds: float = 5.0) -> None:
 
 @contextmanager
 def warned() -> Iterator[None]:
-    """Show a UserError, MissionError or AnswerError of the block as a warning on the page."""
+    """Show a UserError, MissionError or AnswerError of the `with` block as a warning on the page."""
     try:
         yield
     except (AnswerError, MissionError, UserError) as error:

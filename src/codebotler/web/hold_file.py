@@ -16,9 +16,9 @@ HOLD_WRITE_SECONDS = 2.0
 
 
 class HoldFile:
-    """A file that exists from a STOP or a loss until a person has approved a later mission.
+    """A file that exists from a STOP, or the loss of a robot, until a person approves a later mission.
 
-    Each write without a warning is a press of STOP, which all other processes pass on to their own missions.
+    A write without a new warning means that STOP was pressed. All other processes then call `on_press`.
 
     Args:
         path: the file, whose text is the warning about a lost robot, or empty.
@@ -37,18 +37,18 @@ class HoldFile:
         self._writer, self._ended = threading.Thread(), threading.Event()
 
     def open(self) -> None:
-        """Begin to watch the file."""
+        """Start a thread that notices when another process writes the file."""
         make_folder(self._path.parent)
         self._look()
         threading.Thread(target=self._watch, daemon=True).start()
 
     def close(self) -> None:
-        """End the watching, and finish a write."""
+        """Stop watching the file, and wait up to 2 s for a write to end."""
         self._ended.set()
         self.finish()
 
     def finish(self) -> None:
-        """Wait for a write to end, but not for long."""
+        """Wait up to 2 s for a write to end."""
         if self._writer.is_alive():
             self._writer.join(HOLD_WRITE_SECONDS)
 
@@ -58,7 +58,7 @@ class HoldFile:
         return self._is_pending or self._path.exists()
 
     def write(self, warning: str = "") -> None:
-        """Write the file on a thread, since no STOP waits for the disk. "" keeps the old warning."""
+        """Write the file in a thread, so that no STOP waits for the disk. "" keeps the old warning."""
         self._is_pending = True
         self._writer = threading.Thread(target=self._write, args=(warning,), daemon=True)
         self._writer.start()

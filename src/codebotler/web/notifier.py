@@ -9,7 +9,7 @@ from contextlib import aclosing, suppress
 
 
 class Notifier:
-    """Wakes viewers after each change. They read the latest view, so no queue can build up."""
+    """Wakes all viewers after each change. They then read the latest view, so no queue can build up."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

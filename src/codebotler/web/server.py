@@ -54,7 +54,7 @@ _STREAM_END_SECONDS = 3
 
 @dataclass(frozen=True)
 class Companion:
-    """A second server in the page's process and for its robot, such as the server for agents."""
+    """A second server that shares the page's process, port and robot, such as the one for agents."""
 
     routes: Sequence[BaseRoute]  # on the page's port, behind the guard
     run: Callable[[], Coroutine[Any, Any, None]]  # returns at its end
@@ -244,7 +244,7 @@ class _Connection(AutoHTTPProtocol):  # type: ignore[misc,valid-type]  # depends
     """
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Close the connections that have waited longest if too many wait, even if answers are unread."""
+        """If more than 100 connections wait for their clients, close those that have waited longest."""
         super().connection_made(transport)
         self.since = time.monotonic()
         waiting = [one for one in self.connections if isinstance(one, _Connection) and one.is_waiting]
@@ -253,7 +253,7 @@ class _Connection(AutoHTTPProtocol):  # type: ignore[misc,valid-type]  # depends
 
     @property
     def is_waiting(self) -> bool:
-        """Whether no whole request is being answered."""
+        """Whether the connection waits for its client: no complete request is being answered."""
         cycle = self.cycle
         return cycle is None or cycle.more_body or cycle.response_complete
 

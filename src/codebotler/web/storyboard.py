@@ -31,7 +31,7 @@ _NO_STRIP_FITS = "The actual run matches none of these imagined worlds, which ar
 
 @dataclass(frozen=True)
 class Action:
-    """An action of the robot in a room."""
+    """An action of the robot in a room, such as a question, or an answer that the robot hears."""
 
     kind: str  # the kind of event, or `ANSWER`
     text: str
@@ -70,7 +70,7 @@ class Storyboard(NamedTuple):
 
 
 def draw_strips(board: Storyboard) -> None:
-    """Draw a strip for each outcome in imagined worlds. Tick visited rooms; fold strips that do not fit."""
+    """Draw a row of rooms for each expected outcome. Tick visited rooms; fold rows that do not fit."""
     shown = strips(board.check)
     PlainText("h3", board.title if shown else "")
     numbers = [scenes_reached(strip, board.visited, board.learned) for strip in shown]
@@ -92,7 +92,7 @@ def draw_strips(board: Storyboard) -> None:
 
 
 def scenes_reached(strip: Strip, visited: Sequence[str], learned: Sequence[Event]) -> int | None:
-    """Return how many drives of a strip the robot has done, or None if it did or saw something else."""
+    """Return how many of a strip's drives the robot has done, or None if it did or saw anything else."""
     known = [*takewhile(lambda scene: scene.room != _LEFT_OUT, strip.scenes)]
     expected = [deed.text for scene in known for deed in scene.deeds if deed.kind in {CHECK, ANSWER}]
     actual = [_phrase(one) if one.kind == CHECK else _answer_text(one.answer) for one in learned]
@@ -151,7 +151,7 @@ def _number(element: PlainText, step: int, anchor: str) -> None:
 
 
 def strips(check: CheckResult) -> list[Strip]:
-    """Return one strip for each different outcome, but at most 6, with problems first."""
+    """Return the rooms and actions of each different outcome of a check, at most 6, problems first."""
     different: dict[tuple[tuple[Scene, ...], str], tuple[bool, Strip]] = {}
     for sample in check.samples:
         strip = _strip(sample, check)
@@ -183,7 +183,7 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
 def scenes(
     steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int | None] = frozenset()
 ) -> tuple[Scene, ...]:
-    """Group the steps of a run by visits to rooms. Shorten long runs, but keep the `needed` steps."""
+    """Group a run's steps by visits to rooms. Shorten a long run, but keep the steps numbered `needed`."""
     found: list[Scene] = [Scene(shortened(start, _MAX_STEP_TEXT))]
     for is_shown, some in select_steps(steps, needed):
         if not is_shown:

@@ -68,10 +68,10 @@ class Floorplan:
 
 
 def plan_floor(world: World) -> Floorplan:
-    """Plan the floor of a world.
+    """Plan the floors, passages and tables for the rooms of a world.
 
-    Rooms without a footprint line both sides of a corridor, with one door each. Passages connect the others,
-    nearest first, until all can be reached. If the world has objects, each room gets a table if one fits.
+    Rooms without a footprint are placed on both sides of a corridor. Passages join the nearest rooms until
+    all are connected, if they fit. In a world with objects, each room gets a table if there is space.
 
     Raises:
         NotReadyError: rooms overlap or are too narrow, or no table fits into a room with objects.

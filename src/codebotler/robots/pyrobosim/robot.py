@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 
 class Pyrobosim(Simulated):
-    """A simulated robot that pyrobosim drives around walls. It goes to a table to pick or place an object."""
+    """A robot in pyrobosim, which drives around walls, and to a table to pick or place an object."""
 
     name = "pyrobosim"
     if_tool_dies = "the robot in pyrobosim ended as well"
     _drivable: DrivableWorld
 
     def connect(self) -> None:
-        """Build the world in pyrobosim, in its initial state."""
+        """Build the world in pyrobosim in its initial state. Raise NotReadyError if its rooms do not fit."""
         logger = logging.getLogger("pyrobosim")
         if not logger.handlers:  # without a handler, pyrobosim adds one that prints to the terminal
             logger.addHandler(logging.NullHandler())

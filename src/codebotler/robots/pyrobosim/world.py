@@ -42,7 +42,7 @@ T = TypeVar("T")
 
 
 class DrivableWorld:
-    """A pyrobosim world with tables and a robot that can drive. Paths are deterministic."""
+    """A pyrobosim world with tables, in which the robot always takes the same path for the same drive."""
 
     def __init__(self, world: World, clock: Clock) -> None:
         plan = plan_floor(world)
@@ -76,7 +76,7 @@ class DrivableWorld:
         self.robot.set_pose(self._pose(room))
 
     def drive(self, room: str, feedback: Feedback) -> None:
-        """Drive to the stopping position in a room. Raise CancelledError or RobotError if the drive fails."""
+        """Drive to a room's stopping position. Raise CancelledError if stopped, RobotError if impossible."""
         self._navigate(self._pose(room), feedback, "GoToInvalidLocation", f'drive to "{room}"')
 
     def approach_table(self, room: str, skill: str, thing: str, feedback: Feedback) -> None:
@@ -133,7 +133,7 @@ class DrivableWorld:
 
 
 class Roadmap(WorldGraphPlanner):
-    """A graph planner like pyrobosim's own, except that it tests visibility exactly, not by sampling."""
+    """A path planner like pyrobosim's, except that it tests exactly whether a straight line is free."""
 
     plugin_name = "codebotler"
 

@@ -30,7 +30,7 @@ NAMED_ERROR = re.compile(r"([A-Z][A-Za-z]+): (.+)", re.DOTALL)
 
 @dataclass(frozen=True)
 class Timeouts:
-    """Time limits in seconds, above 0."""
+    """Time limits for a robot's servers and skills, in real seconds above 0."""
 
     patience: float = 5.0  # the limit for a server to appear, accept a goal, confirm a stop, or send a result
     silence: float = 3.0  # the time without a status message after which a server counts as dead
@@ -44,7 +44,7 @@ class RosCaller:
         name: the kind of robot, such as ros2.
         address: the robot's address, such as the URI of a ROS master.
         script: the worker's script: the name of a file in `workers/`, or a path.
-        options: the options for opening the robot. A speed other than 1 must equal the virtual robot's.
+        options: the options for opening the robot. With a virtual robot, the speed must equal its speed.
         environment: additional environment variables for the worker.
         waits: the time limits.
         node: the name of the worker's node, which must be unique on the ROS graph.
@@ -79,7 +79,7 @@ class RosCaller:
         self._rescue_lock = threading.RLock()
 
     def connect(self) -> None:
-        """Start a worker, wait for the robot's servers, and set the clock to 0. Call `disconnect` before.
+        """Start a worker, wait for the servers, and set the clock to 0. The robot must not be connected yet.
 
         Raises:
             NotReadyError: ROS, the master or all servers are missing, or another process uses the robot.
@@ -148,7 +148,7 @@ class RosCaller:
             return self._worker, self._number
 
     def cancel(self) -> None:
-        """Have the worker cancel the goal. If the worker hangs or is dead, a new one cancels all goals."""
+        """Have the worker cancel the robot's goal. If the worker hangs or is dead, a new one cancels all."""
         has_lock = self._send_lock.acquire(timeout=CANCEL_SECONDS)  # a hanging worker can block its owner
         try:
             self._stopped = True
@@ -214,7 +214,7 @@ class RosCaller:
 
 
 def calls_data(connection: Connection) -> WorkerMessage:
-    """Return the kind, server, type and definition of each call of a connection, by skill, for a worker."""
+    """Return for each skill its call's kind, server, type and definition, as data for a worker."""
     return {
         skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
         for skill, call in connection.calls.items()

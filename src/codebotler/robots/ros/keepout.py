@@ -20,7 +20,8 @@ def keepout_messages(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return a keepout mask (nav_msgs/OccupancyGrid) and its nav2_msgs/CostmapFilterInfo as plain data.
 
-    Only rules of the form `always: not tr.Exists(inside(...))` count. `frame` is the frame of the rooms.
+    The mask covers the rooms that rules `always: not tr.Exists(inside(...))` forbid; other rules are ignored.
+    `frame` is the coordinate frame of the rooms, and `topic` the topic for the mask.
     """
     patterns = [element for rule in rules if rule.when == "always" for element in _forbidden(rule.formula)]
     zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in patterns)]

@@ -49,7 +49,7 @@ def ros2(options: Options, waits: Timeouts | None = None) -> RosRobot:
 def rosbridge(options: Options, waits: Timeouts | None = None) -> RosRobot:
     """Create a robot behind a rosbridge server, which gives access to ROS over a websocket.
 
-    Its worker uses CodeBotler's Python, so this machine needs no ROS. The default is ws://localhost:9090.
+    Its worker needs no ROS on this machine. The default address is ws://localhost:9090.
     """
     options = replace(options, ros_python=Path(sys.executable))
     address = options.address or ROSBRIDGE_ADDRESS
@@ -70,7 +70,7 @@ def master_uri(address: str = "") -> str:
 
 
 def domain_of(address: str = "") -> str:
-    """Return `address`, or else ROS_DOMAIN_ID, or else 0. Raise UserError if it is not a number."""
+    """Return the ROS 2 domain: `address`, ROS_DOMAIN_ID or else 0. Raise UserError if it is no number."""
     domain = address or os.environ.get("ROS_DOMAIN_ID") or "0"
     if not domain.isdecimal():
         raise UserError(f'"{domain}" is not a ROS_DOMAIN_ID; write a number such as 0')
@@ -85,7 +85,7 @@ def choose_python(named: Path = ROS_PYTHON) -> Path:
 
 
 def ros_readiness(name: str, python: Path = ROS_PYTHON) -> Readiness:
-    """Return whether `python` has the modules for `name`, ros1 or ros2. Message types are built later."""
+    """Check whether `python` can run the worker for `name` (ros1 or ros2), without the message types."""
     if name == "ros1":
         needs: Sequence[str] = ROS1_MODULES
         mend, see = INSTALL_ROS1, "needs a master, see ROS_MASTER_URI"

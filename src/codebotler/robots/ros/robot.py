@@ -88,14 +88,14 @@ class RosRobot(RosCaller):
             values |= _place_values(connection.places, str(arguments[0]))
         call = connection.calls.get(skill)
         if call is None:
-            raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
+            raise RobotError("SkillWithoutAction", f"the declaration of {skill} has no ROS action; add one")
         request = {"do": "perform", "skill": skill, "fields": call.fields(values)}
         result: RobotResult = call.answer(self._request(call, request, feedback))
         return result
 
     @property
     def failed_stop(self) -> str:
-        """A message if the robot moves some seconds after a stop; "" if it is still or reports nothing."""
+        """A warning if the robot still moves a few seconds after a stop, or "" if no report shows that."""
         worker, until = self._worker, time.monotonic() + self._waits.patience * 0.8
         if worker is None or not (self.connection.pose or self.connection.velocity):
             return ""

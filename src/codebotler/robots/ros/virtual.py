@@ -72,7 +72,7 @@ class VirtualRobot:
         self._ended = threading.Event()
 
     def start(self) -> bool:
-        """Offer the skills. Return whether it started a ROS master. Raise NotReadyError if ROS is missing."""
+        """Offer the skills. Return whether this started a master. Raise NotReadyError if ROS is missing."""
         worker = self._worker = self._start_servers()
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)

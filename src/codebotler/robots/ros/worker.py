@@ -34,7 +34,7 @@ ERROR_LINES = 5  # the number of lines of error output to keep for error message
 
 
 class RosWorker:
-    """A process that runs a script of `workers/`. `{"is": "ended"}` is always the last message received.
+    """A process that runs a script of `workers/` to talk to ROS. Its last message is `{"is": "ended"}`.
 
     It runs in its own session so that Ctrl-C does not end it before it has stopped the robot. If heartbeats
     from this process stop, the worker cancels the goal, since a suspended process cannot react to Ctrl-C.
@@ -188,7 +188,7 @@ def executable(python: Path) -> str:
 
 
 def outer_environment() -> dict[str, str]:
-    """Return the environment variables without the changes that ROS from wheels made for this process."""
+    """Return the environment variables, without the changes that a ROS installed by pip has made."""
     environment = dict(os.environ)
     if environment.pop(WHEELS_MARK, None) is not None:
         folders = environment.get("LD_LIBRARY_PATH", "").split(os.pathsep)

@@ -18,7 +18,7 @@ _MAX_DIFFERENCE, _MAX_SENTENCE = 400, 500
 
 
 class CandidatesPane:
-    """Shows a storyboard for each behaviour, side by side, while a mission waits for an answer."""
+    """Asks which of several behaviours a person means, and shows a storyboard for each, side by side."""
 
     def __init__(self, console: Console) -> None:
         self._console = console

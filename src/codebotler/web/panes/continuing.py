@@ -27,7 +27,7 @@ EARLY_ENDS = frozenset({MissionState.FAILED, MissionState.STOPPED, MissionState.
 class ContinueButton(Button):
     """A button to continue a mission that ended early. It first asks about a step that may have happened.
 
-    `model` returns the name of the model that writes the rest, or "" for the one of the mission.
+    `model` returns the name of the model that writes the rest, or "" for the mission's own model.
     """
 
     def __init__(self, console: Console, mission: str = "", model: Callable[[], str] = str) -> None:
@@ -89,7 +89,7 @@ class ContinueButton(Button):
 
 
 def has_rest(view: SessionView) -> bool:
-    """Return whether a mission ended early after it, or a mission that it continues, had begun to run."""
+    """Return whether a mission ended early, and it or the mission that it continues had begun to run."""
     has_past = view.progress.has_begun or view.past is not None
     is_early = view.state in EARLY_ENDS or view.state is None  # without a state, the robot was busy
     return view.is_over and is_early and has_past

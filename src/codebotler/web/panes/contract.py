@@ -12,7 +12,7 @@ from codebotler.web.frame import PlainText
 
 
 def draw_contract(skills: SkillTable, contracts: tuple[Contract, Contract | None]) -> None:
-    """Draw the first contract, and what is new compared with the second (of the draft before), if any."""
+    """Draw the current contract (the first) and what is new since the previous draft's, if it had one."""
     contract, earlier = contracts
     PlainText("h3", "What it may do at most")
     sentence = contract_sentence(contract, skills)

@@ -34,7 +34,7 @@ _MAX_LISTED_MOMENTS, _MAX_TITLE = 60, 160
 
 
 class RobotPane:
-    """Shows the progress of the current mission."""
+    """Shows the state of the current mission, the robot on a map, and what has happened."""
 
     def __init__(self, console: Console, model: Callable[[], str]) -> None:
         self._console = console

@@ -26,7 +26,7 @@ class RulesPane:
         self._box = DrawnBox("house-rules", self._draw)
 
     def show(self, view: SessionView) -> None:
-        """Show which rules are in force."""
+        """Show which rules are in force. Let a person switch them off while the program awaits approval."""
         proofs = () if view.check is None else view.check.proofs
         if self._console.rules:
             self._box.show((view.disabled_rules, view.may_be_approved, proofs))

@@ -47,7 +47,7 @@ class Role(StrEnum):
 
 
 class TooManyTriesError(Exception):
-    """Raised when an address has sent too many invalid tokens. Even a valid one is refused for a while."""
+    """Raised if an address sends too many invalid tokens. For up to a minute, valid ones fail, too."""
 
 
 def new_token() -> str:
@@ -77,7 +77,7 @@ class Access:
         open_to_all: bool = False,
         is_private: bool = True,
     ) -> Access:
-        """Use the given tokens, and random ones for None. Raise UserError if this would be unsafe."""
+        """Create an Access with the given tokens (random for None). Raise UserError if that is unsafe."""
         options = {Role.OPERATOR: operator, Role.FACE: face, Role.AGENT: agent}
         given = [token for token in options.values() if token is not None]
         if open_to_all and (any(given) or not is_private):
@@ -155,7 +155,7 @@ def read_cookie_secret(home: Path) -> bytes:
 
 @dataclass(frozen=True)
 class PageAddress:
-    """The address at which to serve the page."""
+    """Where to serve the page: host and port, other host names, and addresses at reverse proxies."""
 
     host: str = "127.0.0.1"
     port: int | None = None  # 0 for any free port, None for the first free port of `PAGE_PORTS`
@@ -176,7 +176,7 @@ class PageAddress:
         return self.is_loopback and not self.proxies
 
     def listen(self) -> socket.socket:
-        """Open a listening socket. Raise UserError if no port is free."""
+        """Open a socket that listens at this address. Raise UserError if that fails."""
         ports = PAGE_PORTS if self.port is None else (self.port,)
         for port in ports:
             try:
@@ -196,6 +196,6 @@ class PageAddress:
 
     @property
     def hosts(self) -> frozenset[str]:
-        """The host names that requests may name, in lower case and without ports."""
+        """The host names that a Host header may have, in lower case and without ports."""
         named = {name.lower() for name in (self.host, *self.names)} | {one.name for one in self.proxies}
         return LOCAL_HOST_NAMES | named | (set() if self.is_loopback else {socket.gethostname().lower()})

@@ -261,7 +261,7 @@ def _check_role(role: Role | None, path: str) -> None:
     if role is None:
         raise RefusedError(HTTPStatus.UNAUTHORIZED, "open the printed link, which contains the token")
     if role is Role.FACE and not any(path == place or path.startswith(f"{place}/") for place in _FACE_PATHS):
-        raise RefusedError(HTTPStatus.FORBIDDEN, "your link opens only the robot's face")
+        raise RefusedError(HTTPStatus.FORBIDDEN, "your link opens only the face; use the operator's link")
     if role is Role.AGENT and path != AGENT_PATH:
         raise RefusedError(HTTPStatus.FORBIDDEN, f"the token of agents opens only {AGENT_PATH}")
 
@@ -332,7 +332,7 @@ def refusal(
     headers: Mapping[str, str],
     brand: str = "CodeBotler",
 ) -> Response:
-    """Build a response with one sentence, as a page for browsers and as JSON for other clients."""
+    """Build a response that refuses a request: a page for browsers, and JSON for other clients."""
     if "text/html" in request.headers.get("accept", ""):
         return HTMLResponse(_REFUSAL_PAGE.format(sentence=sentence, brand=brand), status, headers)
     return JSONResponse({"detail": sentence}, status, headers)

@@ -92,7 +92,7 @@ def outer_addresses(texts: Iterable[str]) -> tuple[OuterAddress, ...]:
 
 
 def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
-    """Return the addresses on the command line, or else in config.yaml. Raise UserError if one is invalid."""
+    """Return the proxies' addresses from the options, or else from config.yaml, or raise UserError."""
     file = config_file()
     if given or file is None or not file.is_file():
         return outer_addresses(given or ())
@@ -104,7 +104,7 @@ def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
 
 
 def addresses_by_host(addresses: Iterable[OuterAddress]) -> Mapping[str, OuterAddress]:
-    """Return addresses by Host header: with and without the default port, which some clients add."""
+    """Map Host headers, with and without the default port that some clients add, to the addresses."""
     found: dict[str, OuterAddress] = {}
     for address in addresses:
         found[address.host] = address

@@ -27,7 +27,7 @@ PLACE_SKILLS = {"get_all_rooms": False, "get_current_location": True}
 
 @dataclass(frozen=True)
 class SkillCall:
-    """The action, service or topic that performs a skill."""
+    """The action, service or topic that performs a skill, with its request and how to read the answer."""
 
     kind: CallKind
     name: str  # the name of the action, service or topic
@@ -53,7 +53,7 @@ class SkillCall:
             raise RobotError(self.failure, str(error.args[0])) from None
 
     def why(self, received: Values) -> str:
-        """Return why the skill failed, with an error code if there is one, or "" if it is unknown."""
+        """Return the reason for a failure from the received message, with any error code, or "" if none."""
         if self.reason:
             with suppress(LookupError):
                 return str(_get(received, self.reason))
@@ -64,7 +64,7 @@ class SkillCall:
 
 @dataclass(frozen=True)
 class Connection:
-    """A robot's ROS interface.
+    """Says how each skill is performed over ROS, and where the robot's places, poses and pictures are.
 
     Args:
         calls: the action, service or topic for each skill.
@@ -97,7 +97,7 @@ class Connection:
 
 
 def default_connection(skills: SkillTable) -> Connection:
-    """Return the connection that uses the actions from the skills' own declarations."""
+    """Return a connection that performs skills by the ROS actions in their declarations."""
     calls = {}
     for skill in skills.rows:
         if (ros := skill.ros) is not None:

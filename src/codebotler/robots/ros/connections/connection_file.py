@@ -34,14 +34,14 @@ class _ConnectionPart(BaseModel):
 
 
 class PoseForm(_ConnectionPart):
-    """The topic or the transforms that give the robot's pose."""
+    """The `pose` of a connection file: the topic or the transforms that give the robot's pose."""
 
     topic: Topic | None = None
     tf: dict[Literal["from", "to"], str] | None = None
 
 
 class KeepoutForm(_ConnectionPart):
-    """The topics for Nav2's keepout filter."""
+    """The `keepout` of a connection file: the topics for the mask and the info of Nav2's filter."""
 
     mask: Topic
     info: Topic
@@ -65,7 +65,7 @@ class SkillForm(_ConnectionPart):
 
 
 class ConnectionForm(_ConnectionPart):
-    """The structure of a connection file."""
+    """The structure of a connection file: the robot's kind, its places and poses, and its skills."""
 
     robot: Literal["ros1", "rosbridge", "ros2"] = "ros2"
     places: Any = None
@@ -83,7 +83,7 @@ TYPE_FOLDERS = {"action": "action", "service": "srv", "topic": "msg"}
 
 
 def read_connection(path: Path, skills: SkillTable) -> Connection:
-    """Read a connection file with calls for some of the given skills, or raise UserError if it is invalid."""
+    """Read a connection file, which may use only the given skills. Raise UserError if it is invalid."""
     file = YamlFile.read(path)
     form = file.validate(ConnectionForm)
     places = None if form.places is None else read_places(form.places, file)
@@ -129,7 +129,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     at = ("skills", skill.name)
     named = [(kind, name) for kind in MESSAGE_KEYS if (name := getattr(form, kind)) is not None]
     if len(named) != 1 or form.type is None:
-        raise file.wrong('give one of "action", "service" and "topic", and its "type"', *at)
+        raise file.wrong('give exactly one of "action", "service" and "topic", and its "type"', *at)
     kind, name = named[0]
     for other in {*MESSAGE_KEYS.values()} - {MESSAGE_KEYS[kind]}:
         if getattr(form, other):
@@ -154,7 +154,8 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     try:
         SkillCall("topic", "", "", request).fields(dict.fromkeys(known, ""))
     except (AttributeError, TypeError):
-        raise file.wrong("a path has a value and subfields; remove one", *at, MESSAGE_KEYS[kind]) from None
+        sentence = 'a path, such as "x", has a value and also subfields, such as "x.y"; keep one of the two'
+        raise file.wrong(sentence, *at, MESSAGE_KEYS[kind]) from None
     failure = "".join(word.capitalize() for word in skill.name.split("_")) + "Failed"
     whole, ros = _full_type(kind, form.type), skill.ros
     is_ours = ros is not None and whole == f"{ros.package}/action/{ros.type}"

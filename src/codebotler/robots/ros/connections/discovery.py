@@ -50,7 +50,9 @@ NOT_SKILLS = ("pose", "velocity")
 
 
 def discover_offers(address: str, python: Path) -> list[str]:
-    """Return what nodes offer as "KIND NAME TYPE". KIND is action, service, or hears or sends (a topic).
+    """Return the actions, services and topics of all nodes, such as `sends /tf tf2_msgs/msg/TFMessage`.
+
+    The first word is `action`, `service`, `sends` (nodes publish the topic) or `hears` (nodes subscribe).
 
     Args:
         address: a ROS 2 domain number, or "" for the default.
@@ -70,7 +72,7 @@ def discover_offers(address: str, python: Path) -> list[str]:
 
 
 def draft_connection(offers: Iterable[str]) -> str:
-    """Return a draft of a `--connect` file for offers. Lines to complete and unused offers are comments."""
+    """Draft a `--connect` file from the texts of `discover_offers`. Comments show what to complete."""
     valid = filter(re.compile(r"\w+ [\w/]+ [\w/]+").fullmatch, sorted(offers))
     known = [offer for offer in valid if not INTERNAL_OFFERS.fullmatch(offer)]
     rest = {offer.partition(" ")[2] for offer in known}

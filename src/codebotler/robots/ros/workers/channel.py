@@ -23,7 +23,7 @@ class SetupError(Exception):
 
 
 class Channel:
-    """Exchanges lines of JSON on standard input and output. All other output goes to standard error."""
+    """Exchanges lines of JSON with CodeBotler on standard input and output. Prints go to standard error."""
 
     def __init__(self) -> None:
         self._out = os.fdopen(os.dup(1), "w", encoding="utf-8")
@@ -61,7 +61,7 @@ class Channel:
 
 
 def serve(make_worker: Callable[[Channel, Fields], Any]) -> None:
-    """Create a worker from the first message, pass it all others, and stop the robot at the end."""
+    """Create a worker from the first message, pass it all others, then stop the robot and exit."""
     channel = Channel()
     worker, status = None, 1
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):

@@ -25,7 +25,7 @@ class DiscoveryWorker:
 
 
 def find_offers() -> set[Offer]:
-    """Return the actions, services and topics of all other nodes, once no new ones appear."""
+    """Return the kind, name and type of what other nodes offer, once no new offers appear or after 10 s."""
     import rclpy
 
     rclpy.init(args=None)

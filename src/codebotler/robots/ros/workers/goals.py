@@ -95,7 +95,7 @@ class SkillWorker:
         if running and running not in {server.name for server in self.servers.values()}:
             raise SetupError(
                 f"CodeBotler was killed while {running} had a goal, which this connection cannot cancel; "
-                f"connect as before, or stop the robot by hand and delete {self._sign}"
+                f"connect with the same options as before, or stop the robot by hand and delete {self._sign}"
             )
         self._listen(start)
         missing = self.missing()
@@ -108,11 +108,11 @@ class SkillWorker:
         self.channel.send("ready", missing=missing, cancelled_all=cancelled_all)
 
     def connect(self, start: Fields) -> bool:
-        """Set `graph` and `servers`, and return whether a dead worker has left its node behind."""
+        """Connect to ROS and set `graph` and `servers`. Return whether a dead worker left its node behind."""
         raise NotImplementedError
 
     def send(self, goal: Goal, fields: Fields) -> None:
-        """Send a goal. The caller must hold the goal's lock."""
+        """Send a goal with these message fields. The caller must hold the goal's lock."""
         raise NotImplementedError
 
     def listen(
@@ -172,7 +172,7 @@ class SkillWorker:
             time.sleep(WATCH_SECONDS)  # ROS sends messages in its own threads
 
     def missing(self) -> dict[str, str]:
-        """Return a message for each skill whose server cannot be reached, by skill."""
+        """Map each skill whose server cannot be reached to a message that says why."""
         self.wait_for_servers()
         return {
             skill: self.graph.explain_missing(server.name, server.type)
@@ -198,7 +198,7 @@ class SkillWorker:
         return True
 
     def check_goal(self, goal: Goal, sent: float, now: float) -> None:
-        """End a goal as lost if its server has died or exceeded a time limit."""
+        """End a goal, sent at time `sent`, as lost if its server has died or is too slow at time `now`."""
         fault = self._find_fault(goal, sent, now)
         if fault is not None:
             self.end(goal, "lost", text=fault)

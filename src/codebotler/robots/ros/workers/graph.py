@@ -15,7 +15,7 @@ MASTER_SECONDS, NODE_SECONDS = 5.0, 2.0  # the time limits for answers from the 
 
 
 class Ros1Graph:
-    """Our node, whose unique name reserves the robot. It also asks the master about other nodes."""
+    """Our node on ROS 1, whose unique name reserves the robot. It also asks the master about others."""
 
     def __init__(self, name: str) -> None:
         import netifaces  # noqa: F401 - if it is missing, fail here rather than later in a thread of rosgraph
@@ -27,7 +27,7 @@ class Ros1Graph:
         self._rosgraph = rosgraph
 
     def enter(self) -> bool:
-        """Register our node, and return whether a dead worker has left behind a node with the same name."""
+        """Register our node. Return whether a dead node had its name. Raise SetupError if a live one has."""
         import rospy
 
         if not self.is_online():
@@ -71,7 +71,7 @@ class Ros1Graph:
             return None
 
     def explain_end(self) -> str:
-        """Return a message that explains why `has_left` is true."""
+        """Return a sentence that says why our node has ended. Call this if `has_left` is true."""
         return f"another node called {self.node} has taken over; stop it, and connect again"
 
     def nodes_of(self, server: str) -> list[str]:

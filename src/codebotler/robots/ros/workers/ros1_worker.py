@@ -17,7 +17,7 @@ RESULT_DELAY = 0.2  # the assumed seconds until results reach a new client, sinc
 
 
 class Ros1Server(Server):
-    """A client for the action server of one skill."""
+    """A ROS 1 client for the action server of one skill."""
 
     def __init__(self, worker: Ros1Worker, action: Fields) -> None:
         import actionlib

@@ -23,7 +23,7 @@ NODE_IN_USE = "another codebotler is using this robot (the node {}); stop it fir
 
 
 class Ros2Graph:
-    """Our node on the graph, whose executor runs in a thread. Its unique name reserves the robot."""
+    """Our node on ROS 2, whose executor runs in a thread. Its unique name reserves the robot."""
 
     def __init__(self, name: str, taken: str = NODE_IN_USE) -> None:
         import rclpy
@@ -36,10 +36,10 @@ class Ros2Graph:
         rclpy.init(args=None, signal_handler_options=SignalHandlerOptions.NO)
 
     def enter(self, *, is_rescue: bool = False) -> bool:
-        """Start our node, and return whether a dead worker has left behind a node with the same name.
+        """Start our node. Return whether a dead node had its name. Raise SetupError if a live one has.
 
-        If workers on two machines start at the same time, both notice this and stop. A rescue does not look
-        for another worker, because CodeBotler has just killed it.
+        If workers on two machines start at the same time, both notice this and stop. With `is_rescue`, do not
+        look, but return True: CodeBotler has just killed the last worker.
         """
         self._lock = self._take_lock()
         self._is_left_behind = is_rescue or self._has_dead_twin()
@@ -80,7 +80,7 @@ class Ros2Graph:
         return not self._rclpy.ok() or self._has_ended or self._has_double()
 
     def explain_end(self) -> str:
-        """Return a message that explains why `has_left` is true."""
+        """Return a sentence that says why our node has ended. Call this if `has_left` is true."""
         if self._has_ended:
             return f"the node {self.node} has failed in rclpy; connect again"
         if self._rclpy.ok():

@@ -94,7 +94,7 @@ def fill(message: Any, values: Fields, where: str = "") -> Any:
     Args:
         message: the message to modify.
         values: the values by field name. A float field accepts an integer.
-        where: the path of the message for error messages, with a dot at the end.
+        where: the path of the message, such as `pose.`, which error messages put before a field's name.
 
     Raises:
         SetupError: a field does not exist, or a value does not fit.
@@ -161,7 +161,7 @@ def _check_action(name: str, definition: str) -> Any:
         if installed != fields:
             raise SetupError(
                 f"{name} has the fields {', '.join(installed) or 'none'}, "
-                f"but {', '.join(fields) or 'none'} are needed; build it again"
+                f"but {', '.join(fields) or 'none'} are needed; build its package again"
             )
     return spec
 

@@ -33,7 +33,7 @@ class Ros2Goal:
 
 
 class Ros2Server(Server):
-    """A client for the action server of one skill."""
+    """A ROS 2 client for the action server of one skill."""
 
     def __init__(self, worker: Ros2Worker, action: Fields, spec: Any) -> None:
         import rclpy.action
@@ -60,7 +60,7 @@ class Ros2Server(Server):
         self.has_cancelled = False
 
     def last_alive(self) -> float:
-        """Return the monotonic time if the server is on the graph, else 0. DDS removes dead servers late."""
+        """Return the current monotonic time if the server is on the graph (DDS removes it late), else 0."""
         return time.monotonic() if self.client.server_is_ready() else 0.0
 
     def is_connected(self, _silence: float) -> bool:
@@ -80,7 +80,7 @@ class Ros2Server(Server):
             self.has_cancelled = True
 
     def request_cancel(self, number: list[int]) -> Any:
-        """Cancel the goal with this id, or ALL_GOALS. Return a future. Call this in the executor's thread."""
+        """Ask to cancel the goal with this id, or ALL_GOALS, from the executor's thread. Return a future."""
         request = self._request()
         request.goal_info.goal_id.uuid = number
         return self._cancels.call_async(request)
@@ -213,7 +213,7 @@ class Ros2Worker(SkillWorker):
         self.channel.send("progress", text=text)
 
     def check_goal(self, goal: Goal, sent: float, now: float) -> None:
-        """Check a goal, and repeat requests: a cancel can overtake its goal, and an answer can get lost."""
+        """Check a goal's time limits, and repeat a cancel or a request for a result that had no effect."""
         super().check_goal(goal, sent, now)
         handle, cancelled, ended = goal.handle, goal.cancelled, goal.status_ended
         if goal.is_over or handle is None:  # calls of services and topics have no handle
@@ -243,7 +243,7 @@ class Ros2Worker(SkillWorker):
             self.end(goal, "cancelled" if goal.cancelled else "error", state="rejected", text="")
 
     def update_status(self, server: Ros2Server, statuses: Any) -> None:
-        """Process those statuses from a server that are about the current goal."""
+        """Record what a server's statuses say about the current goal: that it was accepted or has ended."""
         goal = self.goal
         if goal is None or goal.is_over or goal.handle is None or goal.server is not server:
             return

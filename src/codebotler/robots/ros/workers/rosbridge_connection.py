@@ -34,7 +34,7 @@ RECALLED = 7
 
 @dataclass(frozen=True)
 class GoalUpdate:
-    """News about a goal. If `goal` is empty, the update only shows that the server is alive."""
+    """A goal's new status, feedback or end. An empty `goal` means only that the server is alive."""
 
     goal: str  # the goal id, or an empty string
     what: str  # status (which implies that the server has accepted the goal), feedback or ended
@@ -45,12 +45,12 @@ class GoalUpdate:
 
 
 class Ros1Protocol:
-    """ROS 1 actions, whose goals, results and statuses are messages on topics."""
+    """The rosbridge messages for ROS 1 actions, whose goals, results and statuses are sent on topics."""
 
     has_status = True  # servers send their status regularly, so a silent server is dead
 
     def opening(self, server: str, action: str) -> Iterator[Fields]:
-        """Yield messages that advertise goals and cancels, and subscribe to the server's other topics."""
+        """Yield the first messages, which advertise goals and cancels and subscribe to results."""
         kind = "/".join(split_type(action)) + "Action"
         for op, name, of in (
             ("advertise", "goal", f"{kind}Goal"),
@@ -90,7 +90,7 @@ class Ros1Protocol:
 
 
 class Ros2Protocol:
-    """ROS 2 actions, which rosbridge supports directly. This is tested only against a simulated rosbridge."""
+    """The rosbridge messages for ROS 2 actions. They are tested only against a simulated rosbridge."""
 
     has_status = False
 
@@ -137,7 +137,7 @@ ActionProtocol: TypeAlias = Ros1Protocol | Ros2Protocol
 
 
 class RosbridgeConnection:
-    """A connection whose thread passes goal updates to `hear`, and calls `lost` if the connection ends."""
+    """A rosbridge connection. Its thread passes goal updates to `hear`, and calls `lost` if it breaks."""
 
     def __init__(
         self,
@@ -185,7 +185,7 @@ class RosbridgeConnection:
         return unsubscribe
 
     def insist(self, message: Fields) -> bool:
-        """Send a message again and again over a new connection for 3 s. Return whether it was ever sent."""
+        """Send a message repeatedly for 3 s over a new connection. Return whether it was sent at all."""
         deadline, is_sent = time.monotonic() + INSIST_SECONDS, False
         while time.monotonic() < deadline:
             with (

@@ -75,7 +75,7 @@ class RosbridgeWorker(SkillWorker):
     def listen(
         self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object]:
-        """Subscribe to a topic as in `SkillWorker.listen`, except that missing publishers go unnoticed."""
+        """Subscribe to a topic as in `SkillWorker.listen`, but never notice that it has no publisher."""
         del is_needed
         return self.graph.listen(topic, hear)
 

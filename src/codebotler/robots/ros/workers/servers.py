@@ -72,7 +72,7 @@ class ActionServers:
 
 
 def start_master(port: int | None, uri: str) -> Any:
-    """Start a ROS master in this process. Raise SetupError if the port is in use, or None."""
+    """Start a ROS master in this process. Raise SetupError if `port` is None or already in use."""
     if port is None:
         raise SetupError(no_master(uri))
     import rosmaster.master
