@@ -40,7 +40,7 @@ class SimulationSettings:
         matching: how requests refer to the labels of a world; `Matching` explains the values.
         people: the names to which people answer: any, or only their own, a word for people or an empty one.
         words_for_people: regexes for words that mean any person.
-        words_for_yes: regexes for options that mean yes. Without a match, the only option that is not a no.
+        words_for_yes: regexes for a yes. If none matches an option, the only one that is not a no is a yes.
         words_for_no: regexes for options that mean no. An option that matches one never means yes.
         events: whether events record the words of the request, or the name of the actual room or thing.
             `as-happened` records no event for a drive to an unknown room.

@@ -57,7 +57,7 @@ class Worker:
         """Run programs. Each outcome depends only on the program and its robot.
 
         Args:
-            jobs: the programs; all robots must have the same skills and the same `literals` setting.
+            jobs: programs with functions that create their robots, all with the same skills and `literals`.
 
         Returns:
             each program's outcomes, one per robot. A repeated run gets a new robot.

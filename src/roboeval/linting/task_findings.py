@@ -30,7 +30,7 @@ Verdicts: TypeAlias = Sequence[Verdict]  # verdicts on a program in all worlds o
 
 
 def task_findings(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """Yield likely mistakes in a task as a whole, such as unused checks; see `judge_solutions`."""
+    """Yield likely mistakes in a task as a whole. `verdicts` come from `judge_solutions`."""
     yield from (*_unused(task), *_unsaid(task), *_uncovered(task), *_slow(task), *_unworded(task))
     yield from (*_misjudged(task, verdicts), *_untripped(task, verdicts))
 

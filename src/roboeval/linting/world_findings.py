@@ -53,7 +53,7 @@ class JudgedWorld:
         return Finding(kind, subject, message, self.task.path, line)
 
     def findings(self) -> Iterator[Finding]:
-        """Yield likely mistakes in this world, which is not compared with others here."""
+        """Yield likely mistakes in the requirements of this world, without a comparison with other worlds."""
         for requirement in self.require:
             yield from self.dead_regexes(requirement)
             for what, name in absent_names(requirement, self.scenario, self.task):

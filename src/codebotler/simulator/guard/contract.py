@@ -43,7 +43,7 @@ class RequestedCall:
 
     @classmethod
     def of(cls, row: Skill, arguments: Sequence[Argument], rooms: Sequence[str], place: str) -> RequestedCall:
-        """Create the call of a skill made in the room `place`. `rooms` are those that a goal may mean."""
+        """Create a skill call in the room `place`. For a drive, `rooms` are those that its goal may mean."""
         texts = []
         for parameter, value in zip(row.parameters, arguments, strict=True):
             if is_goal(row, parameter.name) and rooms:

@@ -63,7 +63,7 @@ class Rule:
         return any(one.place is not None for one in self.elements if one.kind == event.kind)
 
     def results(self, attempt: Event) -> Sequence[Event]:
-        """Return a copy of an attempt for each `found` or `answer` that the rule compares, or else itself."""
+        """Return the event with each possible result, or unchanged if the rule compares no results."""
         compared = [one for one in self.elements if one.kind == attempt.kind]
         if any(one.found is not None for one in compared):
             return [replace(attempt, found=True), replace(attempt, found=False)]
@@ -73,7 +73,7 @@ class Rule:
 
 
 class RuleViolationError(RobotError):
-    """The error that a rule would be broken, has been broken or cannot be judged.
+    """Raised if a rule would be broken, has been broken or cannot be judged.
 
     Args:
         rule: the rule in question.

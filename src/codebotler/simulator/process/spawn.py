@@ -44,7 +44,7 @@ def start_fork_server(*descriptors: int) -> subprocess.Popen[bytes]:
 
 
 def start_module(code: str, arguments: Sequence[str], descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
-    """Start a process that runs `code`. It inherits the descriptors; their numbers end its `sys.argv`."""
+    """Start a process that runs `code`. Its `sys.argv` has the arguments, then the inherited descriptors."""
     folders = [os.path.abspath(folder) for folder in sys.path]  # noqa: PTH100 - Path.resolve follows links
     setup = f"import sys; sys.path[:] = {folders!r}; {code}"
     return _start(["-c", setup, *arguments, *map(str, descriptors)], descriptors)
@@ -111,7 +111,7 @@ def _written_file() -> IO[bytes]:
 
 
 def compiled_modules(compiler: Callable[[str, str], bytes]) -> bytes:
-    """Compile all modules of a fork server. Return a marshalled dict. `compiler` is called like `code_of`."""
+    """Compile all modules of a fork server to a marshalled dict by name. `compiler` works as `code_of`."""
     package = f"{SIMULATOR}.sandbox"
     files = {package: str(SANDBOX / "__init__.py")}
     files |= {f"{package}.{path.stem}": str(path) for path in sorted(SANDBOX.glob("[a-z]*.py"))}

@@ -110,7 +110,7 @@ class ProgramVerifier:
             wild()
 
     def is_data(self, name: str) -> bool:
-        """Return whether a name refers to data in the current function, not to a function or builtin."""
+        """Return whether a name in the current function can only be data, not a function or builtin."""
         if name in self.functions:
             return False
         if name not in self.special:

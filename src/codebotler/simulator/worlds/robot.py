@@ -57,7 +57,7 @@ class SimulatedRobot(SimulatedWorld):
         self.setup: Setup = ("simulated", (world, settings))
         missing = () if skills is SKILLS else [name for name, row in skills.items() if row.does is None]
         if missing:
-            raise UserError(f'the skill "{missing[0]}" cannot be simulated because it has no code; write its code')
+            raise UserError(f'the skill "{missing[0]}" cannot be simulated because it has no code; add code')
         self.held: str | None = None
         self.taken: Thing | None = None
         self.now, self.is_live = 0.0, False
@@ -166,7 +166,7 @@ class SimulatedRobot(SimulatedWorld):
         self.held, self.taken = obj, thing
 
     def put(self, obj: str) -> None:
-        """Put down the held object. `obj` must be the name used to pick it up or, if `as-happened`, fit."""
+        """Put down the held object. `obj` must be the name used to pick it up (`as-happened`: must fit)."""
         taken = self.taken if self.settings.events == "as-happened" else None
         is_meant = taken is not None and taken.is_meant_by(obj, self.settings.matching)
         if self.held is None or (self.held != obj and not is_meant):

@@ -57,7 +57,7 @@ class ExploredRoom:
 
 @dataclass
 class RoomSearch:
-    """The rooms in which a program looked for a person or thing, and in which of them it was."""
+    """The rooms in which a program looked for a person or thing: those without it and those with it."""
 
     rooms_without: set[str] = field(default_factory=set)
     rooms_with: set[str] = field(default_factory=set)

@@ -219,7 +219,7 @@ class SampledRobot(SimulatedRobot):
         return options[self._draw("answer", len(options), agreeing, *question)]
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], errors: Sequence[str] = ()) -> int:
-        """Choose a statement's outcome once, by chance. Return its position in `outcomes`, then `errors`."""
+        """Choose a statement's outcome once, by chance. Return its position in `outcomes` + `errors`."""
         possible = [*outcomes, *errors]
         if statement not in self.outcomes:
             drawn = self.outcomes[statement] = self._draw("outcome", len(possible), statement)
@@ -373,7 +373,7 @@ class SampledRobot(SimulatedRobot):
         return is_there
 
     def take(self, obj: str) -> None:
-        """Pick up an object. An object not looked for is here (if strict, only by chance)."""
+        """Pick up an object. An object not looked for is here (in strict worlds, only by chance)."""
         name = normalized(obj)
         if self.held is None and self.is_here(name) is None and self._lies_there(name):
             self._add(name, self.room)
