@@ -70,7 +70,7 @@ def choose(
 
     A text selects the first option that contains it. For yes and no, the settings' other words count as well.
     Any other text means yes if the question contains it, else no. A number counts options from 1, or from the
-    end if it is negative. A number that is too large selects the last option, or the first if it is negative.
+    end if it is negative. A number out of range selects the last option, or the first if it is negative.
     """
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
