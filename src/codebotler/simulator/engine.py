@@ -25,7 +25,11 @@ def run(
     skills: SkillTable = SKILLS,
     require_isolation: bool = False,
 ) -> Iterator[Outcome]:
-    """Run each program in its world, and yield the outcomes in order, by default with a worker per core."""
+    """Run each program in its world, and yield the outcomes in order. Equal pairs run only once.
+
+    `workers` is the number of runs at the same time (by default one per core). If `require_isolation` is
+    true, raise EngineError where the kernel does not support seccomp; otherwise, warn.
+    """
     with WorkerPool(workers or cores(), require_isolation=require_isolation) as pool:
 
         def run_pairs(pairs: Sequence[tuple[str, World]]) -> list[Outcome]:
@@ -45,7 +49,7 @@ def run(
 
 
 def digest(*texts: str) -> bytes:
-    """Return a hash of texts and their lengths, so that "ab", "c" and "a", "bc" get different ones."""
+    """Return the SHA-256 hash of several texts. The texts "ab", "c" and "a", "bc" have different hashes."""
     hashed = hashlib.sha256()
     for text in texts:
         data = text.encode(errors="surrogatepass")

@@ -24,7 +24,7 @@ STOPPED_BY_RULE: SkillAnswer = ("stop", True)
 
 
 class SkillPerformer(Protocol):
-    """A robot that can perform the skills of a run. A skill may take any amount of time."""
+    """A robot, simulated or real, that performs the skill calls of a run. A call may take any time."""
 
     settings: SimulationSettings
     skills: SkillTable
@@ -47,13 +47,13 @@ class SkillPerformer(Protocol):
 
 
 def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, float, bool]:
-    """Return a run's fuel, time, time limit and clock start (in seconds), and whether the robot is live."""
+    """Return a run's fuel (steps); its time, time limit and clock start in seconds; whether time is real."""
     settings, limits = robot.settings, robot.settings.limits
     return limits.ticks, robot.now, limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 
 
 class Ledger:
-    """Counts the skill calls and texts of one run, and ends the run at a limit."""
+    """Passes the skill calls of one run to the robot, counts them, and ends the run at a limit."""
 
     def __init__(self, robot: SkillPerformer) -> None:
         self.robot, self.limits = robot, robot.settings.limits
@@ -63,7 +63,7 @@ class Ledger:
         self.broken: RobotError | None = None  # the error of the rule that ended the run
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:
-        """Let the robot execute one skill, or return `STOP` if the run has reached a limit."""
+        """Let the robot execute one skill and return its answer, or return `STOP` if a limit is reached."""
         self._spend(arguments)
         if self.limit is not None:
             return STOP
@@ -86,7 +86,7 @@ class Ledger:
             self.robot.sleep_until(float(now))
 
     def outcome_at_end(self, final: Mapping[str, object]) -> Outcome:
-        """Return the outcome of a run from the last message of its process."""
+        """Return the outcome of a run, given the last message (`final`) of its process."""
         line = final.get("line")
         if self.limit is not None:
             status = Status.TIMEOUT if self.broken is None else Status.ROBOT_ERROR
@@ -134,7 +134,7 @@ class Ledger:
 
 
 def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
-    """Return the outcome, or a robot error instead if the program finished but broke a rule by ending."""
+    """Return the outcome, or a robot error instead if the program finished but a rule is not kept."""
     unkept = robot.guard.find_first_unkept() if robot.guard is not None and outcome.error is None else None
     if unkept is None:
         return outcome
@@ -142,14 +142,14 @@ def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
 
 
 def too_long(limits: Limits) -> str:
-    """Return the limit on the length of one text in words, such as "a text of more than 50 characters"."""
+    """Return a phrase about the limit on a text's length: "a text of more than 50 characters"."""
     return f"a text of more than {limits.text:,} characters"
 
 
 class RememberingLedger(Ledger):
     """Counts the calls of a simulated run, and caches the answers to calls that change nothing.
 
-    This helps programs that look a thousand times while they wait. It starts after UNREMEMBERED_CALLS calls.
+    This helps programs that look a thousand times while they wait. Caching starts after UNREMEMBERED_CALLS.
     """
 
     def __init__(self, robot: SimulatedRobot) -> None:

@@ -36,11 +36,11 @@ _Arguments = ParamSpec("_Arguments")
 
 
 class WorkerPool:
-    """Runs functions in threads that each own one worker.
+    """Runs functions in threads, each of which has a `Worker` to run programs.
 
     The first worker starts in the background. As a context manager, the pool waits for it on entry. With
     `contextlib.closing`, only the first call waits. Without seccomp, the pool warns, or raises EngineError if
-    isolation is required. `Worker` explains `one_process_per_run`.
+    `require_isolation` is true. `Worker` explains `one_process_per_run`.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class WorkerPool:
         name: Callable[[_Key], bytes],
         then: Callable[[_Called], Any] = lambda result: result,
     ) -> Iterator[Any]:
-        """Call a function on batches of keys in pool threads, and yield results as `map_batches` does."""
+        """Call a function on batches of keys in pool threads. Yield results in order; see `map_batches`."""
         return map_batches(
             lambda some: self.submit(function, some),
             keys,
@@ -203,7 +203,7 @@ def _next(queue: SimpleQueue[_Value]) -> _Value:
 
 
 class DistinctKeys(Generic[_Key]):
-    """Reads keys in advance, and returns them in batches. A key whose name has occurred is left out."""
+    """Reads keys in advance, and returns them in batches. Of keys with equal names, it uses the first."""
 
     def __init__(self, keys: Iterable[_Key], name: Callable[[_Key], bytes]) -> None:
         self._keys, self._name = iter(keys), name
@@ -278,7 +278,7 @@ class ResultFile:
 
 
 def shared_pool() -> WorkerPool:
-    """Return this process's pool, started on first use with a worker per core. A fork gets its own pool."""
+    """Return this process's pool, started on first use with a worker per core, but at least two."""
     with SHARED_POOL.lock:
         if SHARED_POOL.pool is None:
             # With two workers, the check of an agent's program does not hold up the check of a person's.
@@ -306,7 +306,7 @@ class SharedPool:
                 self.pool = None
 
     def begin_anew(self) -> None:
-        """After a fork, leave the pool to the parent, whose threads do not exist in the child."""
+        """In a forked child, forget the parent's pool, whose threads do not exist in the child."""
         self.pool = None
         self.lock.release()
 

@@ -38,9 +38,9 @@ class SimulationSettings:
     Args:
         literals: `lowercase` converts a program's string literals before the run, as the paper's authors did.
         matching: how requests refer to the labels of a world; `Matching` explains the values.
-        people: whether people answer to any name, or only to their own, to a word for people and to no name.
+        people: the names to which people answer: any, or only their own, a word for people or an empty one.
         words_for_people: regexes for words that mean any person.
-        words_for_yes: regexes for options that mean yes. If none matches, a single option without a no does.
+        words_for_yes: regexes for a yes. If none matches an option, the only one that is not a no is a yes.
         words_for_no: regexes for options that mean no. An option that matches one never means yes.
         events: whether events record the words of the request, or the name of the actual room or thing.
             `as-happened` records no event for a drive to an unknown room.
@@ -68,9 +68,9 @@ def choose(
 ) -> int | None:
     """Return the position of the option that an answer refers to, or None if there is none.
 
-    A text selects the first option that contains it. Yes and no can also be found by the settings' other
-    words. Any other text means yes if the question contains it, else no. A number counts options from 1, or
-    from the end if it is negative; if it is too large, it selects the nearest option.
+    A text selects the first option that contains it. For yes and no, the settings' other words count as well.
+    Any other text means yes if the question contains it, else no. A number counts options from 1, or from the
+    end if it is negative. A number out of range selects the last option, or the first if it is negative.
     """
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1

@@ -70,9 +70,9 @@ class SkillProtocol:
         return self.ledger.outcome_at_end(final or {})
 
     def talk(self) -> dict[str, object] | None:
-        """Answer requests, and return the child's last message, about its end, or None if there is none."""
+        """Answer requests. Return the child's last message, which says how the run ended, or None."""
         if self.child.receive() is None:
-            raise LostProcessError("the process of a run ended before it was isolated")
+            raise LostProcessError("a process ended before its isolation; the machine may lack memory")
         overrun = 0
         while (message := self.child.receive()) is not None:
             if isinstance(message, dict):
@@ -83,7 +83,7 @@ class SkillProtocol:
                 case [str() as name, list() as values, int() | float() as now, int() as line]:
                     pass  # from a live program; only for display, since it may be false
                 case _:
-                    raise ProtocolError("a request is not valid")
+                    raise ProtocolError("a request does not have the form of a skill call")
             if self.robot.is_live:
                 self.robot.line = line if type(line) is int and 0 < line <= MAX_LINE else None
             self.child.send((*self._answer(name, values, now), self.robot.now))
@@ -111,12 +111,12 @@ class SkillProtocol:
             case "too-long", _:
                 self.ledger.limit = too_long(self.limits)
             case _:
-                raise ProtocolError("a request names an unknown skill")
+                raise ProtocolError("a request names a skill that does not exist")
         return STOP
 
 
 def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
-    """Return the name and the parameters of each of a robot's skills, as a program's process needs them."""
+    """Return the name and the parameters of each skill of a robot, to send to a program's process."""
     return tuple(
         (skill.name, tuple((p.name, p.kind, p.type.choices, p.in_words) for p in skill.parameters))
         for skill in robot.skills.rows
@@ -136,7 +136,7 @@ def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:
         elif not parameter.is_options and parameter.type.fits(value):
             arguments.append(tuple(value) if isinstance(value, list) else value)  # type: ignore[arg-type]  # `fits` has checked its type
         else:
-            raise ProtocolError("an argument has the wrong type")
+            raise ProtocolError(f"an argument of {skill.name} has the wrong type")
     return arguments
 
 
@@ -145,7 +145,7 @@ def _option(value: object) -> Option:
         case [str(text), bool(is_text)]:
             return Option(text, is_text)
         case _:
-            raise ProtocolError("an option is not valid")
+            raise ProtocolError("an option of a question is not valid")
 
 
 def named_arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]:
@@ -159,7 +159,7 @@ def named_arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]
     with suppress(ProtocolError):
         if {*given} == {parameter.name for parameter in skill.parameters}:
             return arguments_of(skill, values)
-    raise UserError(f"the arguments do not fit the skill; call it as {skill.signature}")
+    raise UserError(f"the arguments do not fit; call the skill as {skill.signature}")
 
 
 def named_result(skill: Skill, arguments: Sequence[Argument], result: Result) -> Result:

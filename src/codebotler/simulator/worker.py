@@ -57,7 +57,7 @@ class Worker:
         """Run programs. Each outcome depends only on the program and its robot.
 
         Args:
-            jobs: the programs; all robots must have the same skills and the same `literals` setting.
+            jobs: programs with functions that create their robots, all with the same skills and `literals`.
 
         Returns:
             each program's outcomes, one per robot. A repeated run gets a new robot.
@@ -88,7 +88,7 @@ class Worker:
         return isinstance(_compile(source, robot), CompiledProgram)
 
     def stop(self) -> None:
-        """Kill all processes and the current run. Any thread may call this. Use the worker no more."""
+        """Kill all processes and the current run. Any thread may call this. Do not use the worker again."""
         self._stopped = True
         for fork_server in list(self._fork_servers.values()):
             fork_server.kill()
@@ -102,7 +102,7 @@ class Worker:
     # --- several tame programs in one child
 
     def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
-        """Run the tame programs. Return outcomes by (job, robot) positions, without undecided ones."""
+        """Run the tame programs. Return outcomes by position of job and robot; run the missing ones alone."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
             return known
@@ -158,7 +158,7 @@ class Worker:
 
     @contextmanager
     def one_child(self) -> Iterator[None]:
-        """Run all batches in this context in the same process. They must belong to one program."""
+        """Use the same process for all batches that run in this context. All must be of one program."""
         self._keeps_child = True
         try:
             yield

@@ -40,7 +40,7 @@ class Finding:
 
     @property
     def name(self) -> str:
-        """Return the name under which a task file accepts the finding, such as `implied: comes_back`."""
+        """The name under which a task file accepts the finding, such as `implied: comes_back`."""
         return f"{self.kind}: {self.subject}"
 
     def rendered(self) -> str:

@@ -30,7 +30,7 @@ Verdicts: TypeAlias = Sequence[Verdict]  # verdicts on a program in all worlds o
 
 
 def task_findings(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """Yield all findings about a task as a whole. `verdicts` are those of `judge_solutions`."""
+    """Yield likely mistakes in a task as a whole. `verdicts` come from `judge_solutions`."""
     yield from (*_unused(task), *_unsaid(task), *_uncovered(task), *_slow(task), *_unworded(task))
     yield from (*_misjudged(task, verdicts), *_untripped(task, verdicts))
 
@@ -155,7 +155,7 @@ def _slow(task: Task) -> Iterator[Finding]:
 
 
 def searched_regexes(task: Task) -> dict[str, Requirement]:
-    """Map each regex that judging a program searches for to the first requirement with the regex."""
+    """Return all regexes that are searched for to judge programs, each with the first requirement for it."""
     found: dict[str, Requirement] = {}
     for requirement in {one.text: one for one in _required(task)}.values():
         for element in elements(requirement.formula):
@@ -176,7 +176,7 @@ def _compiled(text: TextPattern) -> Iterator[str]:
 
 
 def judge_solutions(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:
-    """Return the verdicts on each solution of a task: first in its worlds, then in those of its ablation."""
+    """Run all solutions of a task in its worlds, then in those of its ablation. Return the verdicts."""
     judges = [worlds for worlds in (task.scenarios, task.ablation) if worlds]
     runs = [(solution.program, worlds) for worlds in judges for solution in solutions(task)]
     with WorkerPool(workers) as pool:

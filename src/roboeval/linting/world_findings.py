@@ -25,7 +25,7 @@ from roboeval.suites.load import Requirement, Scenario, Task
 
 @dataclass(frozen=True)
 class JudgedWorld:
-    """A world of a task, or of its ablation, with its requirements."""
+    """A world of a task, or of its ablation, whose requirements are searched for mistakes."""
 
     task: Task
     number: int  # the number of the world, from 1
@@ -35,25 +35,25 @@ class JudgedWorld:
 
     @property
     def name(self) -> str:
-        """Return the name of the world for messages, such as `world 2` or `the ablation of world 2`."""
+        """The name of the world for messages, such as `world 2` or `the ablation of world 2`."""
         return f"{'the ablation of ' if self.ablated else ''}world {self.number}"
 
     @property
     def require(self) -> tuple[Requirement, ...]:
-        """Return the requirements of the world."""
+        """The requirements that programs must satisfy in the world."""
         return self.scenario.require
 
     @property
     def line(self) -> int | None:
-        """Return the line of the world in the task file."""
+        """The line of the world in the task file, from 1, or None if the file is empty."""
         return YamlFile.read(self.task.path).line(("worlds", self.number - 1))
 
     def finding(self, kind: FindingKind, subject: str, message: str, line: int | None) -> Finding:
-        """Return a new finding about the task of this world, with the path of its file."""
+        """Create a finding about this world's task. `subject` identifies it among those of its kind."""
         return Finding(kind, subject, message, self.task.path, line)
 
     def findings(self) -> Iterator[Finding]:
-        """Yield all findings about this world alone."""
+        """Yield likely mistakes in the requirements of this world, without a comparison with other worlds."""
         for requirement in self.require:
             yield from self.dead_regexes(requirement)
             for what, name in absent_names(requirement, self.scenario, self.task):
@@ -136,7 +136,7 @@ class JudgedWorld:
 
 
 def judged_worlds(task: Task, matching: Matching = "label-in-request") -> Iterator[JudgedWorld]:
-    """Yield the worlds of a task, then those of its ablation."""
+    """Yield the worlds of a task, then those of its ablation (only requirements of common sense)."""
     for ablated in (False, True):
         for number, scenario in enumerate(task.judged_in(ablated=ablated), 1):
             yield JudgedWorld(task, number, scenario, ablated, matching)

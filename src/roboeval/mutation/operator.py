@@ -16,7 +16,7 @@ from roboeval.mutation.program_tree import Edit, ProgramTree, text_of
 
 @dataclass(frozen=True)
 class Context:
-    """The prompts of a task and the names that occur in its worlds."""
+    """What operators know of a task: its prompts, and the names of rooms, people and things in its worlds."""
 
     rooms: tuple[str, ...]  # without the rooms where the robot starts
     people: tuple[str, ...]  # owners of rooms, the only people named in instructions
@@ -37,7 +37,7 @@ class Context:
         )
 
     def idle_rooms(self, program: ProgramTree) -> tuple[str, ...]:
-        """Return the rooms whose names share no word with any string in a program."""
+        """Return the rooms that a program does not mention: no string has a word of their names."""
         texts = filter(None, map(text_of, program.nodes))
         named = {word for text in texts for word in re.findall(r"\w+", text.lower())}
         return tuple(room for room in self.rooms if not named & set(re.findall(r"\w+", room.lower())))
@@ -50,7 +50,7 @@ Condition: TypeAlias = Callable[[Context], bool]
 
 @dataclass(frozen=True)
 class Operator:
-    """A mutation operator. It makes one kind of mistake that models make, such as a missing drive."""
+    """A mutation operator: it puts one kind of mistake into programs, such as a missing drive."""
 
     name: str  # such as `drop-the-return`
     about: str
@@ -58,14 +58,15 @@ class Operator:
 
 
 def operators_in(module: ModuleType) -> Iterator[Operator]:
-    """Yield an operator for each public function of a module, described by the function's docstring."""
+    """Yield an operator for each public function of a module. Its docstring says what its edits do."""
     for name, function in vars(module).items():
         if isfunction(function) and function.__module__ == module.__name__ and not name.startswith("_"):
-            yield Operator(name.replace("_", "-"), function.__doc__ or "", function)
+            about = (function.__doc__ or "").removeprefix("Yield each edit that ").capitalize()
+            yield Operator(name.replace("_", "-"), about, function)
 
 
 def only_if(condition: Condition) -> Callable[[Mutate], Mutate]:
-    """Return a decorator that limits an operator to tasks that meet a condition. Others get no edits."""
+    """Return a decorator for an operator. It yields no edits for a task that does not meet the condition."""
 
     def conditional(edits: Mutate) -> Mutate:
         @wraps(edits)
@@ -84,7 +85,7 @@ def prompt_matches(pattern: str) -> Condition:
 
 
 def next_names(names: Sequence[str], name: str, most: int = 2) -> tuple[str, ...]:
-    """Return up to `most` names after a name in a list, such as `c` and `a` after `b` in `a, b, c`."""
+    """Return up to `most` names that follow a name in a cycle: `c` and `a` follow `b` in `a, b, c`."""
     folded = [one.lower() for one in names]
     at = folded.index(name.lower()) if name.lower() in folded else -1
     around = [*names[at + 1 :], *names[: max(at, 0)]]

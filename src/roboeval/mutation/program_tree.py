@@ -47,7 +47,7 @@ class ProgramTree:
                 yield node
 
     def steps(self, *skills: str) -> Iterator[tuple[ast.Expr, ast.Call]]:
-        """Yield each statement that only calls one of the skills, such as `say("Hi")`, and the call."""
+        """Yield each statement that only calls one of the skills, such as `say("Hi")`, with its call."""
         for node in self.nodes:
             match node:
                 case ast.Expr(ast.Call() as call) if skill_of(call) in skills:
@@ -66,7 +66,7 @@ def parse_tree(program: str) -> ProgramTree | None:
 
 
 def is_compilable(program: str) -> bool:
-    """Whether a program's source compiles, and does so within our limits of time and memory."""
+    """Return whether a program compiles within our limits of time and memory."""
     try:
         return _compiles(program)
     except IsolatedCallError:
@@ -79,7 +79,7 @@ def _compiles(program: str) -> bool:
 
 
 def rewrite(node: Node, edit: Edit) -> Node:
-    """Copy a node, replacing the nodes inside it that are keys of `edit`. An emptied body gets a `pass`."""
+    """Copy a node, and replace the nodes in the copy as `edit` says. Put `pass` into an emptied body."""
     fields: dict[str, object] = {}
     for name, value in ast.iter_fields(node):
         if isinstance(value, list):
@@ -141,7 +141,7 @@ def text_of(node: ast.AST | None) -> str | None:
 
 
 def is_pause(node: ast.AST) -> bool:
-    """Whether a statement is a call of `sleep`, such as `time.sleep(5)`."""
+    """Return whether a statement is a call of `sleep`, such as `time.sleep(5)`."""
     match node:
         case ast.Expr(ast.Call(ast.Name("sleep") | ast.Attribute(_, "sleep"))):
             return True

@@ -13,7 +13,7 @@ MAX_EQUIVALENT_SHARE = 0.15  # largest share of equivalent mutants for which the
 
 
 class MutantStatus(StrEnum):
-    """Whether the checks reject a mutant (killed) or not (survived), or why it is not counted."""
+    """The status of a mutant: rejected by the checks (killed), not rejected (survived), or not counted."""
 
     KILLED = "killed"
     SURVIVED = "survived"
@@ -71,7 +71,7 @@ class MutationScore:
 
     @property
     def score_of_all(self) -> float | None:
-        """Like `score`, but equivalent mutants count as not killed. None if no mutant changes behaviour."""
+        """The share of killed mutants among all that change behaviour, or None if there are none."""
         return self._killed_of(*CHANGING_STATUSES)
 
     def _killed_of(self, *statuses: MutantStatus) -> float | None:
@@ -80,7 +80,7 @@ class MutationScore:
 
     @property
     def survivors(self) -> tuple[Mutant, ...]:
-        """The mutants that pass in all worlds although they are not listed as equivalent."""
+        """The mutants that pass in all worlds, change behaviour, and are not listed as equivalent."""
         return tuple(one.mutant for one in self.mutants if one.result.status is MutantStatus.SURVIVED)
 
     @property

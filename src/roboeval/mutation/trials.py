@@ -86,7 +86,7 @@ def _satisfied(scenarios: Sequence[Scenario], faults: Sequence[MutantResult | No
 
 
 def mutation_worlds(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
-    """Return the worlds for mutants: hand-written ones, or `count` (default: 200) sampled with a new seed."""
+    """Return the worlds to run mutants in: `count` (default: 200) new samples, or those written by hand."""
     if suite.worlds is None and count is None:
         return task.scenarios
     sampled = suite.with_worlds(count or DEFAULT_MUTANT_WORLDS, seed + 1 + (suite.seed or 0))
@@ -94,7 +94,7 @@ def mutation_worlds(suite: Suite, task: Task, count: int | None, seed: int) -> t
 
 
 def find_failure(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> MutantResult | None:
-    """Return the first failure among a program's outcomes, one per scenario, or None if it never fails."""
+    """Return a program's first failure as a killed mutant's result, or None if it passes in each scenario."""
     verdicts = map(judge, outcomes, scenarios)
     return next((_killed(verdict) for verdict in verdicts if not verdict.satisfied), None)
 

@@ -55,13 +55,13 @@ def mission_tools() -> list[dict[str, Any]]:
 
 @dataclass
 class TrainingMission:
-    """A policy's mission: `call` skills until it `is_over`. Equal calls always have equal results.
+    """A mission for a policy, to `call` skills until it `is_over`. Equal calls have equal results.
 
     Args:
         family: the family of the task.
         seed: the seed of the task.
         prompt_index: the number of the phrasing, from 0.
-        world: the index of the world among those with something to do. Larger numbers begin again at 0.
+        world: the number of the world, from 0, among those with something to do; counting wraps around.
 
     Raises:
         UserError: the family or prompt does not exist.
@@ -88,7 +88,7 @@ class TrainingMission:
         return cls(**{name: row[name] for name in ("family", "seed", "prompt_index", "world")})
 
     def call(self, name: str, arguments: str | Mapping[str, object]) -> str:
-        """Call a skill, `wait` or `give_up`, and return the result as text. After the end, do nothing."""
+        """Call a tool with arguments (a mapping or JSON), and return the result as text."""
         if self.is_over:
             return "the mission is over"
         self._calls_left -= 1

@@ -46,7 +46,7 @@ UNDECIDED_RUN = b"null"  # replaces a transcript if the run must be repeated in 
 
 
 def main(*descriptors: str) -> None:
-    """Prepare everything that batches share, then fork children to run them."""
+    """Run a fork server for batches. Its `descriptors` are a socket and a pipe to the engine, as numbers."""
     reset_inherited_settings()
     arrange(list(map(int, descriptors)))
     door = socket(fileno=RUN_DOOR)
@@ -63,7 +63,7 @@ def main(*descriptors: str) -> None:
 
 
 def execute(run: TranscribedRun, rehearsal: Batch) -> NoReturn:
-    """Run the batches that the engine sends, and send back transcripts, until the engine hangs up."""
+    """Run the batch `rehearsal` to warm up. Then run the engine's batches, and send back transcripts."""
     # A child is forked before it is needed, and first runs a rehearsal, because the kernel copies each page
     # on the first write to it, which takes longer than most batches.
     transcripts(run, rehearsal)
@@ -76,7 +76,7 @@ def transcripts(
     batch: Batch,
     send: Callable[[list[bytes]], None] = len,  # type: ignore[assignment]  # a rehearsal sends nothing
 ) -> None:
-    """Run each program of a batch in all its worlds, and pass the transcripts of each program to `send`."""
+    """Run the programs of a batch, each in all its worlds. Pass the transcripts to `send` (default: drop)."""
     skills, elsewhere, pickled, programs = batch
     if skills != run.skills:
         run.provide(skills)
@@ -108,7 +108,7 @@ class TranscribedRun(ProgramRun):
         self.provided.update(time=sys.modules["time"], __builtins__=self.builtins)
 
     def transcript(self, code: CodeType, kind: str, arguments: tuple[Any, ...]) -> bytes:
-        """Run a program on a new robot `ROBOTS[kind](*arguments)`, and return its transcript as JSON."""
+        """Run a program on the robot `ROBOTS[kind](*arguments)`. Return a transcript, or `null` to retry."""
         self._reset(ROBOTS[kind](*arguments))
         sys.setrecursionlimit(BATCH_RECURSION_LIMIT)
         end = self.execute(code, run_parameters(self.ledger.robot))
@@ -126,7 +126,7 @@ class TranscribedRun(ProgramRun):
         self.refuel()
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Execute a skill, if possible on this process's copy of the robot, and return its result."""
+        """Execute a skill on this process's copy of the robot, or else on the engine's. Return its result."""
         given = [
             _robot_argument(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)
         ]
@@ -157,12 +157,12 @@ class TranscribedRun(ProgramRun):
             raise LimitReachedError
 
     def request(self, request: str) -> NoReturn:  # noqa: ARG002 - as in ProgramRun
-        """End the run. The only request of a tame program says that its simulated time is up."""
+        """End the run, since its simulated time is up. Programs in batches make no other request."""
         self._let_time_pass()
         raise LimitReachedError
 
     def except_hook(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
-        """Return a function for each `except`: it marks runs that catch a recursion or memory error."""
+        """Return the function that each `except` calls. If stack or memory ran out, the run is repeated."""
 
         def caught() -> None:
             error = sys.exc_info()[0]
@@ -173,7 +173,7 @@ class TranscribedRun(ProgramRun):
         return caught
 
     def ended_by(self, error: BaseException) -> str:
-        """Return the program's end as JSON. After a recursion or memory error, the run must be repeated."""
+        """Return as JSON how the program ended. After a recursion or memory error, the run is repeated."""
         try:
             str(error)
         except (RecursionError, MemoryError):

@@ -23,7 +23,7 @@ Programs: TypeAlias = Sequence[tuple[bytes, Sequence[SimulatedRobot]]]
 
 
 class Call(NamedTuple):
-    """A skill call and its answer."""
+    """A program's call of a skill, and the answer that it got from the child's copy of the robot."""
 
     skill: str
     arguments: tuple[Scalar | tuple[Option | Scalar, ...], ...]
@@ -50,7 +50,7 @@ TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 def message(
     programs: Programs,
 ) -> tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
-    """Return the message for a child: skills, own skills, pickled robots, each program's robot numbers."""
+    """Return a batch for a child: skills, names of own skills, pickled robots, code with robot numbers."""
     robot = programs[0][1][0]
     setups: dict[tuple[int, ...], Setup] = {}
     keyed = []
@@ -85,12 +85,12 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
         answer = replay.follow(transcript)
         if replay.ledger.broken is not None:
             if transcript.end is None:
-                raise ProtocolError("a rule ends the run, but the child is waiting")
+                raise ProtocolError("a rule has ended the run, but the child waits for an answer to continue")
             return None  # repeat the run in its own process, to learn at which line the rule ended it
         if transcript.end is not None:
             outcome = judge_end(replay.ledger.outcome_at_end(transcript.end), robot)
             if outcome.status is Status.KILLED:
-                raise ProtocolError("the end of a transcript is not valid")
+                raise ProtocolError("the child did not report correctly how the run ended")
             if key is not None:
                 if len(REPLAYED) >= MAX_REPLAYS:
                     REPLAYED.clear()
@@ -104,27 +104,27 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
 def _frame(child: IsolatedProcess) -> bytes:
     frame = child.receive_bytes(MAX_FRAME)
     if frame is None:
-        raise LostProcessError("the process of a batch of runs ended before its last run")
+        raise LostProcessError("the process of a batch ended before the batch was done")
     return frame
 
 
 def key_of(frame: bytes, robot: SimulatedRobot) -> ReplayKey | None:
-    """Return the cache key of a robot's transcript, or None if its replay must not be cached."""
+    """Return the cache key of a robot's transcript (`frame`), or None if the outcome must not be cached."""
     if len(frame) > MAX_REPLAY_BYTES or robot.setup[0] != "simulated" or robot.own_skills or robot.guard:
         return None
     return frame, id(robot.skills), *map(id, robot.setup[1])
 
 
 def parse_transcript(frame: bytes) -> Transcript | None:
-    """Parse a transcript, or return None if the child asks to repeat the run in its own process."""
+    """Parse a transcript. Return None if the run must be repeated. Raise ProtocolError if it is invalid."""
     try:
         return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # the decoder returns this type
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        raise ProtocolError("a transcript is not valid") from None
+        raise ProtocolError("the child sent a transcript that is not valid") from None
 
 
 class Replay:
-    """Repeats a transcript's skill calls on the engine's own robot."""
+    """Repeats a transcript's skill calls on the engine's own robot, and compares the answers."""
 
     def __init__(self, robot: SimulatedRobot) -> None:
         self.robot, self.ledger = robot, RememberingLedger(robot)
@@ -134,28 +134,28 @@ class Replay:
         """Repeat all calls, and return the robot's last answer. Raise ProtocolError if any answer differs."""
         calls = [self._expected(call) for call in transcript.calls]
         if transcript.end is None and (not calls or calls[-1][-1] is not None):
-            raise ProtocolError("the child is waiting for an answer, but has asked for nothing")
+            raise ProtocolError("the child waits for an answer, but its transcript asks for none")
         ledger = self.ledger
         answer: SkillAnswer = ("ok", None)
         for skill, arguments, now, expected in calls:
             if now != self.robot.now:
                 self._let_time_pass(now)
             if ledger.limit is not None:
-                raise ProtocolError("a transcript continues after a limit was reached")
+                raise ProtocolError("a transcript contains more skill calls after the run reached a limit")
             answer = ledger.perform(skill, arguments)
             if ledger.broken is not None:
                 return answer
             if expected is not None and expected != (
                 answer if answer[0] != "error" else ("error", answer[1][1:])
             ):
-                raise ProtocolError("a transcript and the robot give different answers")
+                raise ProtocolError("the child's robot and the engine's robot gave different answers")
         if transcript.end is not None:
             self._let_time_pass(transcript.now)
         return answer
 
     def _let_time_pass(self, now: float) -> None:
         if now < self.robot.now:
-            raise ProtocolError("in a transcript, the clock goes backwards")
+            raise ProtocolError("the clock of a transcript goes backwards")
         if self.ledger.limit is None:
             self.ledger.let_time_pass(now)
 
@@ -164,9 +164,9 @@ class Replay:
         skill = self.robot.skills.get(call.skill)
         known = () if skill is None else skill.parameters
         if skill is None or len(known) != len(call.arguments) or not all(map(_fits, known, call.arguments)):
-            raise ProtocolError(f'a transcript has an invalid call of "{call.skill[:100]}"')
+            raise ProtocolError(f'a transcript contains an invalid call of the skill "{call.skill[:100]}"')
         if call.kind == "ask" and call.skill not in self._own:
-            raise ProtocolError("the program's process asks the engine for a skill that it has itself")
+            raise ProtocolError("the child asks the engine to execute a skill that it must execute itself")
         value = tuple(call.value) if call.kind == "error" and isinstance(call.value, list) else call.value
         arguments: Any = call.arguments  # checked above
         return call.skill, arguments, call.now, None if call.kind == "ask" else (call.kind, value)

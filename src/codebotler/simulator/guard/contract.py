@@ -33,7 +33,7 @@ class RequestedCall:
 
     Args:
         skill: the name of the skill.
-        texts: for each argument, its texts (several for a list); for a drive, the rooms that it may mean.
+        texts: for each argument, its texts (several for a list); for a goal, all rooms that it may mean.
         place: the robot's room; "" if it is unknown.
     """
 
@@ -43,7 +43,7 @@ class RequestedCall:
 
     @classmethod
     def of(cls, row: Skill, arguments: Sequence[Argument], rooms: Sequence[str], place: str) -> RequestedCall:
-        """Return the call of a skill with these arguments. For a drive, `rooms` replace the goal's text."""
+        """Create a skill call in the room `place`. For a drive, `rooms` are those that its goal may mean."""
         texts = []
         for parameter, value in zip(row.parameters, arguments, strict=True):
             if is_goal(row, parameter.name) and rooms:
@@ -58,7 +58,7 @@ class RequestedCall:
 
 
 def is_goal(row: Skill, parameter: str) -> bool:
-    """Return whether a skill is a drive, and this parameter is the room to drive to."""
+    """Return whether this parameter of a skill is the room to which the robot will drive."""
     return row.is_drive and row.recording is not None and row.recording.text == parameter
 
 
@@ -72,7 +72,7 @@ class SkillBound:
     """The limits within which a program may call one skill.
 
     Args:
-        texts: for each parameter, its name and templates of the texts that it may have.
+        texts: for each parameter, its name and templates; each of its texts must match one of them.
         places: the rooms in which the skill may be called; None for any.
         at_most: how many successful calls one run may make; None for any number.
     """
@@ -82,7 +82,7 @@ class SkillBound:
     at_most: int | None = None
 
     def objection(self, call: RequestedCall) -> str:
-        """Return the reason against a call: `since its obj may be "mug", and not "pen"`; "" if allowed."""
+        """Return why a call is forbidden: `since its obj may be "mug", and not "pen"`; or "" if allowed."""
         for (name, allowed), texts in zip(self.texts, call.texts, strict=True):
             for text in texts:
                 if not any(template.matches(text) for template in allowed):
@@ -94,7 +94,7 @@ class SkillBound:
         return f'since it may happen in {_some(self.places)}, and not in "{brief(call.place)}"'
 
     def excess_over(self, other: SkillBound) -> SkillBound | None:
-        """Return the part of this bound that the other bound forbids, or None if it forbids nothing.
+        """Return the part of this bound that the other bound forbids, or None if there is none.
 
         If this bound is wider in several ways, such as more rooms and more calls, return the whole bound.
         """
@@ -125,9 +125,9 @@ class Contract:
     skills: Mapping[str, SkillBound]
 
     def objection(self, call: RequestedCall, earlier: int = 0) -> str:
-        """Return the reason against a call, such as "since ask may not be called"; "" if it is allowed.
+        """Return why a call is forbidden, such as "since ask may not be called", or "" if it is allowed.
 
-        `earlier` is how many calls of this skill have succeeded before in the run.
+        `earlier` is the number of calls of this skill that have succeeded in the run so far.
         """
         bound = self.skills.get(call.skill)
         if call.skill in TELLING_SKILLS:
@@ -149,7 +149,7 @@ class Contract:
 
 
 def contract_violation(row: Skill, arguments: Sequence[Argument], place: str, why: str) -> RuleViolationError:
-    """Return the error for a call that a contract forbids. `why` is from `Contract.objection`."""
+    """Return the error for a forbidden call in the room `place`. `why` comes from `Contract.objection`."""
     event = attempted_event(row, arguments, place=place, time=0.0)
     return RuleViolationError(CONTRACT, event or Event(row.name, ""), "forbids", why)
 

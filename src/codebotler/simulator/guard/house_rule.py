@@ -55,7 +55,7 @@ class Rule:
 
     @property
     def names_destination(self) -> bool:
-        """Whether the rule mentions drives to particular rooms, such as the kitchen, not just any drive."""
+        """Whether the rule mentions drives to particular rooms, such as the kitchen."""
         return any(one.kind == GOTO and one.text != Regex(".*") for one in self.elements)
 
     def depends_on_room(self, event: Event) -> bool:
@@ -63,7 +63,7 @@ class Rule:
         return any(one.place is not None for one in self.elements if one.kind == event.kind)
 
     def results(self, attempt: Event) -> Sequence[Event]:
-        """Return the event with each possible `found` or `answer`, or unchanged if the rule ignores them."""
+        """Return the event with each possible result, or unchanged if the rule compares no results."""
         compared = [one for one in self.elements if one.kind == attempt.kind]
         if any(one.found is not None for one in compared):
             return [replace(attempt, found=True), replace(attempt, found=False)]
@@ -73,12 +73,12 @@ class Rule:
 
 
 class RuleViolationError(RobotError):
-    """A rule would be broken, has been broken or cannot be judged.
+    """Raised if a rule would be broken, has been broken or cannot be judged.
 
     Args:
         rule: the rule in question.
         event: the event that breaks the rule, or None if the rule is broken at the end of a mission.
-        objection: how the event conflicts with the rule.
+        objection: the verb between rule and event: the rule forbids, cannot judge or is broken by the event.
         why: the reason why the rule cannot be judged, as the end of a sentence: "since ...".
     """
 

@@ -27,7 +27,7 @@ KINDS_OF_MOVES = {PICK, PLACE}
 
 
 def name_of(label: str, request: str) -> str:
-    """Return a room's or thing's name in rules: its label, or the program's request if that is a regex."""
+    """Return the name that rules compare: the world's label or, if the label is a regex, the request."""
     is_name = PLAIN_LABEL.fullmatch(label) or not request or label.casefold() in request.casefold()
     return label if is_name else request
 
@@ -176,13 +176,13 @@ class RuleGuard:
         self._calls[row.name] -= 1
 
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
-        """Raise RuleViolationError if a possible next event (all are drives if `is_drive`) breaks a rule."""
+        """Raise RuleViolationError if a possible next event breaks a rule. If `is_drive`, all are drives."""
         found = list(self.find_violations(attempts, is_drive=is_drive))
         if found:
             raise min(found, key=lambda broken: not broken.ends_run)  # another rule may end the run
 
     def find_violations(self, attempts: Sequence[Event], *, is_drive: bool) -> Iterator[RuleViolationError]:
-        """Yield an error for each rule and each possible next event (drives if `is_drive`) that breaks it."""
+        """Yield an error for each rule that a possible next event breaks. If `is_drive`, all are drives."""
         attempts = tuple(map(_trimmed, attempts))
         leaves = is_drive and any(map(self._leaves, attempts[1:] or attempts))
         for rule, monitor in self._history.monitors:
@@ -226,13 +226,13 @@ class RuleGuard:
         return late
 
     def record_drive(self, start: Point, end: Point, holding: str) -> None:
-        """Record which rooms a straight drive has entered. Raise RuleViolationError if that broke a rule."""
+        """Record the rooms entered on a drive while `holding` a thing. Raise an error if a rule is broken."""
         if self.judges_poses:
             for event in self._entered(rooms_along(self._rooms, start, end), holding):
                 self.judge_result(event)
 
     def give_up(self, rules: Iterable[Rule], event: Event) -> None:
-        """Stop judging rules whose room is unknown. Raise an error for the first that must always hold."""
+        """Stop judging these rules, as the room is unknown. Raise an error for the first `always` rule."""
         for rule in rules:
             self._history.unjudged.add(rule.name)
             if rule.when == "always":

@@ -23,7 +23,7 @@ STATUSES = {"TimeoutError": Status.TIMEOUT, "MemoryError": Status.PYTHON_ERROR} 
 
 @dataclass(frozen=True)
 class CompiledProgram:
-    """A program that was compiled successfully."""
+    """A program's compiled code, and whether the program may share a process with others (is tame)."""
 
     code: bytes  # marshalled; only a child may unmarshal it
     is_tame: bool  # whether it leaves nothing behind for later runs in its process
@@ -31,15 +31,10 @@ class CompiledProgram:
 
 @lru_cache(maxsize=16)  # a program runs in several worlds
 def compile_program(source: str, literals: str, skills: tuple[str, ...]) -> CompiledProgram | Outcome:
-    """Compile a program, or return the outcome of all its runs if that fails.
+    """Compile a program in an isolated process, or return the outcome of all its runs if that fails.
 
-    Args:
-        source: the program.
-        literals: the setting of the suite, `lowercase` or `as-written`.
-        skills: the names of the skills that it may call.
-
-    Raises:
-        EngineError: no isolated process can be started.
+    `literals` is the suite's setting, `lowercase` or `as-written`. `skills` are the names of the skills that
+    the program may call. Raise EngineError if no isolated process can be started.
     """
     if len(source) > MAX_SOURCE:
         message = f"the program is longer than {MAX_SOURCE:,} characters"
@@ -54,7 +49,7 @@ def compile_program(source: str, literals: str, skills: tuple[str, ...]) -> Comp
 def compile_programs(
     sources: Sequence[str], literals: str, skills: tuple[str, ...]
 ) -> list[CompiledProgram | Outcome]:
-    """Compile several programs as `compile_program` does, all in a single call if they are short."""
+    """Compile several programs, all in one call of an isolated process if they are short."""
     if len(sources) > 1 and sum(map(len, sources)) <= LONG_SOURCE:
         try:
             return [result_of(*each) for each in _compile_all(sources, literals, skills)]
@@ -64,7 +59,7 @@ def compile_programs(
 
 
 def result_of(kind: str, text: str, further: Any) -> CompiledProgram | Outcome:  # noqa: ANN401 - from JSON
-    """Convert a result of `compile_here` to a program, or an error to the outcome of all runs."""
+    """Convert a result of `compile_here` to a compiled program, or an error to the outcome of all runs."""
     if kind == CODE:
         return CompiledProgram(b64decode(text), further)
     return Outcome(Status.PYTHON_ERROR, (), RunError(kind, text), further)
@@ -83,11 +78,8 @@ def _compile_all(
 def compile_here(source: str, literals: str, skills: frozenset[str]) -> tuple[str, str, int | None]:
     """Compile a program in this process, which must be a closed process if the text is untrusted.
 
-    Returns:
-        CODE, the code in base64 and whether it is tame, or an error's kind, message and line.
-
-    Raises:
-        MemoryError: the program, or earlier ones, used up the memory.
+    Return CODE, the code in base64, and whether the program is tame; or the kind, message and line of an
+    error. Raise MemoryError if the program, or an earlier one, used up the memory.
     """
     try:
         code, is_tame = prepared(source, lowercase=literals == "lowercase", skills=skills)

@@ -23,7 +23,7 @@ class ProtocolError(Exception):
 
 
 def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, RunError]:
-    """Explain why a process died, from its exit status and its limit of processor time in `seconds`."""
+    """Return why a process died. `status` is its exit status or minus a signal, `seconds` its time limit."""
     match -status:
         case signal.SIGXCPU:
             return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")

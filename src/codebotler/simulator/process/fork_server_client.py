@@ -71,7 +71,7 @@ class ForkServer:
                 socket.send_fds(self._door, [LIVE_RUN if is_live else SIMULATED_RUN], [theirs.fileno()])
         except OSError:
             ours.close()
-            raise LostProcessError("the fork server has ended") from None
+            raise LostProcessError("the fork server has ended; the machine may lack memory") from None
         return IsolatedProcess(self._pid_of_child, ours, self._end_of_child)
 
     @property
@@ -104,7 +104,7 @@ class ForkServer:
         self._end_is_unread = True
         pid = self._read_report()
         if pid <= 1:  # a signal to such an id would reach a whole group of processes
-            raise LostProcessError("the fork server did not report the ID of its new process")
+            raise LostProcessError("the fork server reported an invalid process ID")
         return pid
 
     def _end_of_child(self) -> int:
@@ -114,12 +114,12 @@ class ForkServer:
     def _read_report(self) -> int:
         data = self._report.read(REPORT_BYTES)
         if not data:
-            raise LostProcessError("the fork server has ended")
+            raise LostProcessError("the fork server has ended; the machine may lack memory")
         return int.from_bytes(data, sys.byteorder, signed=True)
 
 
 class BatchServer(ForkServer):
-    """Starts a fork server that forks children for batches of tame programs, each in advance."""
+    """Starts a fork server for batches of tame (simple) programs. It forks each child in advance."""
 
     def __init__(self) -> None:
         self._next: IsolatedProcess | None = None
@@ -129,7 +129,7 @@ class BatchServer(ForkServer):
         return start_module(BATCH_CODE, (), descriptors)
 
     def fork(self, *, is_live: bool = False) -> IsolatedProcess:
-        """Return the child that was forked in advance, or else a new one. No batch is live."""
+        """Return the child that was forked in advance, or else a new one. `is_live` is False for batches."""
         child, self._next = self._next, None
         if child is not None and self.has_ended:  # another process may have the child's id now
             child.close_channel()

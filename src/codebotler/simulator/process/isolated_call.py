@@ -51,7 +51,7 @@ class IsolatedCallError(Exception):
 
 
 class IsolatedFunction(Generic[_Arguments, _Result]):
-    """A function that runs in a sandboxed process; made by the decorator `isolated`."""
+    """A function that runs in an isolated process when it is called; made by the decorator `isolated`."""
 
     def __init__(self, function: Callable[_Arguments, _Result], rehearsal: tuple[Any, ...]) -> None:
         self.function, self.rehearsal = function, rehearsal
@@ -89,16 +89,16 @@ class IsolatedFunction(Generic[_Arguments, _Result]):
 def isolated(
     *rehearsal: object,
 ) -> Callable[[Callable[_Arguments, _Result]], IsolatedFunction[_Arguments, _Result]]:
-    """Make a module's function run in a closed process.
+    """Return a decorator that makes a module's function run in an isolated process.
 
     The function's arguments are pickled, and its result is returned as JSON, in which tuples become lists.
-    Each new process first makes a call with the arguments `rehearsal`, before it is closed.
+    Each new process first calls the function with the arguments `rehearsal`, to complete its imports.
     """
     return lambda function: IsolatedFunction(function, rehearsal)
 
 
 class ClosedProcess:
-    """A process that can reach only its channel. It calls the isolated functions of one module."""
+    """An isolated process that calls functions of one module. It can reach only its channel to us."""
 
     def __init__(self, module: str) -> None:
         ours, theirs = channel_pair()
@@ -107,15 +107,15 @@ class ClosedProcess:
         self._channel = IsolatedProcess(lambda: self._process.pid, ours, self._process.wait)
         if self._channel.receive_bytes(len(RESULT)) != RESULT:
             self.end()
-            raise LostProcessError("a closed process did not start")
+            raise LostProcessError("the process did not start; the machine may lack memory")
 
     def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - a function may return any type
-        """Call a function by its name, with pickled (args, kwargs), in the process. Return its result."""
+        """Call a function in the process, and return its result. `arguments` are pickled (args, kwargs)."""
         self._channel.send((name, arguments))
         try:
             answer = self._channel.receive_bytes(len(RESULT) + MAX_RESULT)
         except TimeoutError:  # our own functions never wait, so the machine is to blame
-            raise LostProcessError("the process did not answer in time") from None
+            raise LostProcessError("the process was too slow; the machine may be overloaded") from None
         except ProtocolError as error:
             raise IsolatedCallError("MemoryError", f"the result is too large: {error}") from None
         self._channel.restart_wait()
@@ -154,7 +154,7 @@ os.register_at_fork(after_in_child=IDLE_PROCESSES.clear)
 
 
 def serve(module: str, descriptor: str) -> NoReturn:
-    """Call functions of a module for the engine, until the engine closes the channel `descriptor`."""
+    """Call a module's functions when the engine asks, until the engine closes the channel `descriptor`."""
     import unicodedata as _  # noqa: F401, PLC0415 - needed to parse "\N{...}", and cannot be imported later
 
     reset_inherited_settings()

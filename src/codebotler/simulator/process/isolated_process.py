@@ -80,7 +80,7 @@ class IsolatedProcess:
         return message
 
     def receive_bytes(self, most: int) -> bytes | None:
-        """Return the next message as bytes, at most `most` of them, or None if the process has hung up."""
+        """Return the next message, or None if the process hung up. Raise ProtocolError above `most` bytes."""
         used: int | None = None
         while True:
             if len(self._buffer) >= HEADER:
@@ -131,7 +131,7 @@ class IsolatedProcess:
             self.close_channel()
 
     def end_gently(self) -> int:
-        """Give the process 0.1 seconds to exit, then kill it. Return its exit status, as `end` does."""
+        """Give the process 0.1 seconds to exit, then kill it. Return its exit status or minus its signal."""
         for _ in range(50):
             if _stat(self.pid)[:1] in ([], ["Z"]):
                 break
@@ -139,7 +139,7 @@ class IsolatedProcess:
         return self.end()
 
     def restart_wait(self) -> None:
-        """Allow the full waiting time again, after an answer."""
+        """Reset the time left to wait for the process to PROCESS_WAIT_SECONDS, since it has answered."""
         self.wait_left = PROCESS_WAIT_SECONDS
 
     def close_channel(self) -> None:
@@ -150,8 +150,8 @@ class IsolatedProcess:
 def channel_pair() -> tuple[socket.socket, socket.socket]:
     """Return the two ends of a new channel: ours, and the one for the process.
 
-    On Linux, each `read` of the process returns as many bytes as it asks for, however fast we send them. The
-    sizes of what it reads change its heap, which programs can observe.
+    On Linux, each `read` of the process returns as many bytes as it asks for, however fast we send them.
+    Otherwise, the sizes of the pieces would vary and change the heap, which programs can observe.
     """
     ours, theirs = socket.socketpair()
     CHANNELS.add(ours)

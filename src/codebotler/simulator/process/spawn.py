@@ -38,13 +38,13 @@ CHILD_ENVIRONMENT = {
 
 
 def start_fork_server(*descriptors: int) -> subprocess.Popen[bytes]:
-    """Start a fork server with fixed memory addresses, these descriptors, and the code of its modules."""
+    """Start a fork server with fixed memory addresses. It inherits these open file descriptors."""
     handed = (*descriptors, compiled_file().fileno())
     return _start([str(SANDBOX / "start.py"), *map(str, handed)], handed)
 
 
 def start_module(code: str, arguments: Sequence[str], descriptors: Sequence[int]) -> subprocess.Popen[bytes]:
-    """Run a line of our code in a new process that can import our modules, with arguments and descriptors."""
+    """Start a process that runs `code`. Its `sys.argv` has the arguments, then the inherited descriptors."""
     folders = [os.path.abspath(folder) for folder in sys.path]  # noqa: PTH100 - Path.resolve follows links
     setup = f"import sys; sys.path[:] = {folders!r}; {code}"
     return _start(["-c", setup, *arguments, *map(str, descriptors)], descriptors)
@@ -74,7 +74,7 @@ os.register_at_fork(before=START_LOCK.acquire, after_in_parent=START_LOCK.releas
 
 
 def leave_to_parent() -> None:
-    """After a fork, leave all isolated processes to the parent, which alone can wait for them."""
+    """In a forked child, forget all isolated processes, since only the parent can wait for them."""
     for process in PROCESSES:
         process.returncode = 0
     for channel in CHANNELS:
@@ -103,7 +103,7 @@ def _written_file() -> IO[bytes]:
         file.flush()
     except OSError as error:  # the file size limit applies to files in memory as well
         hint = "allow larger files with `ulimit -f unlimited`"
-        raise LostProcessError(f"our code cannot be stored ({error.strerror}); {hint}") from None
+        raise LostProcessError(f"the compiled sandbox cannot be stored ({error.strerror}); {hint}") from None
     return file
 
 
@@ -111,7 +111,7 @@ def _written_file() -> IO[bytes]:
 
 
 def compiled_modules(compiler: Callable[[str, str], bytes]) -> bytes:
-    """Return the code of all modules of a fork server as a marshalled dict. `compiler` is like `code_of`."""
+    """Compile all modules of a fork server to a marshalled dict by name. `compiler` works as `code_of`."""
     package = f"{SIMULATOR}.sandbox"
     files = {package: str(SANDBOX / "__init__.py")}
     files |= {f"{package}.{path.stem}": str(path) for path in sorted(SANDBOX.glob("[a-z]*.py"))}
@@ -123,7 +123,7 @@ def compiled_modules(compiler: Callable[[str, str], bytes]) -> bytes:
 
 
 def stdlib_files() -> dict[str, Path]:
-    """Return the file of each standard library module, by name, that programs can import."""
+    """Return the names and files of the standard library modules that programs can import."""
     folder, files = Path(os.__file__).parent, {}
     for name in IMPORTED:
         path = folder.joinpath(*name.split("."))
@@ -137,7 +137,7 @@ def stdlib_files() -> dict[str, Path]:
 
 
 def code_of(file: str, shown: str) -> bytes:
-    """Return a Python file's marshalled code, whatever our Python's options. Tracebacks call it `shown`."""
+    """Return a Python file's marshalled code, whatever our Python's options. Tracebacks show `shown`."""
     code = None
     if not sys.flags.optimize:
         with contextlib.suppress(EOFError, ImportError, ValueError):  # the bytecode file is damaged

@@ -30,7 +30,7 @@ def send(text: str) -> None:
 
 
 def send_frames(frames: list[bytes]) -> None:
-    """Send several messages at once, each after its length."""
+    """Send several messages at once, each preceded by its length."""
     data = b"".join([len(frame).to_bytes(HEADER, "big") + frame for frame in frames])
     written = write(CHANNEL, data)
     while written < len(data):

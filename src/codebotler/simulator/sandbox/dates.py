@@ -7,7 +7,7 @@ import time
 
 
 class StandIn(type):
-    """Metaclass for replacements, which accept instances and subclasses of the original class."""
+    """Metaclass of the two replacements. Objects of the original class count as instances of them."""
 
     def __instancecheck__(cls, thing: object) -> bool:
         if cls in (date, datetime):

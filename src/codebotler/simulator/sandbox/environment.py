@@ -100,7 +100,7 @@ class Lock:
         self._is_held = False
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:  # noqa: FBT001, FBT002 - as in _thread
-        """Take a free lock and return True. Else wait and return False, or without a timeout end the run."""
+        """Take the lock if it is free. Else wait and return False; a wait without `timeout` ends the run."""
         if not blocking and timeout != -1:
             raise ValueError("can't specify a timeout for a non-blocking call")
         if not self._is_held:
@@ -133,7 +133,7 @@ class Lock:
 
 
 def simulate_locks(run: ProgramRun) -> None:
-    """Replace all locks created from now on. Call this before `threading` is imported."""
+    """Make all new locks wait on the clock of `run`. Call this before `threading` is imported."""
     Lock.run = run
     Lock.__module__ = "_thread"
     vars(_thread).update(allocate_lock=Lock, allocate=Lock, lock=Lock, LockType=Lock)

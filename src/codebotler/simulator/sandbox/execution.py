@@ -36,7 +36,7 @@ UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not as
 
 
 class ProgramRun:
-    """Runs one program. The fork server prepares as much as possible before the fork."""
+    """Runs one program in a child process. It is created before the fork, so that children start fast."""
 
     recursion_limit = PROGRAM_RECURSION_LIMIT
 
@@ -63,7 +63,7 @@ class ProgramRun:
         names.update(sys=sys, time=sys.modules["time"], __builtins__=builtins)
 
     def execute(self, code: bytes | types.CodeType, parameters: RunParameters) -> str:
-        """Run the program, whose code may be marshalled, and return how it ended, as JSON."""
+        """Run the program with these limits and clocks, and return how it ended as JSON."""
         self.fuel, self.now, self.seconds, self.start, self.is_live = parameters
         names = vars(self.namespace)
         sys.modules["__main__"] = self.namespace
@@ -80,7 +80,7 @@ class ProgramRun:
         return self.ended_by(LimitReachedError()) if self.has_reached_limit else '{"end":"finished"}'
 
     def ended_by(self, error: BaseException) -> str:
-        """Return the program's end as JSON, from the error that ended it, whose class may be its own."""
+        """Return as JSON how the program ended, given the error that ended it."""
         kind, line = type(error), self.refused_at or _last_line(error)
         message = str.__getitem__(_message_of(error), slice(1000))  # a subclass of `str` may use fuel
         where = f'"line":{"null" if line is None else line}'
@@ -102,7 +102,7 @@ class ProgramRun:
         return f'{{"end":"python-error","kind":{quoted(name)},"message":{quoted(message)},{where}}}'
 
     def counters(self) -> dict[str, Callable[[], None]]:
-        """Return the functions that we insert into compiled programs, by name."""
+        """Return the functions that compiled programs call to use fuel and to record calls, by name."""
         use_fuel = self.fuel_counter()
         return {
             FUEL: use_fuel,
@@ -124,7 +124,7 @@ class ProgramRun:
         self.entered = True
 
     def has_entered(self, task: object) -> bool:
-        """Return whether the program itself has called `task_program`, the function `task`, by any name."""
+        """Return whether the program has called its function `task`, the task program, under any name."""
         return self.entered or (type(task) is types.FunctionType and task.__code__ in self.codes)
 
     def is_unawaited(self, task: object) -> bool:
@@ -136,7 +136,7 @@ class ProgramRun:
         )
 
     def fuel_counter(self) -> Callable[[], None]:
-        """Return a function that uses one unit of fuel per call, and raises once all fuel is used."""
+        """Return a function that uses one unit of fuel, or raises LimitReachedError if none is left."""
         self.refuel()
 
         def use_fuel() -> None:
@@ -147,11 +147,11 @@ class ProgramRun:
         return use_fuel
 
     def except_hook(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
-        """Return the function to call at the start of each `except` and `finally`."""
+        """Return the function that each `except` and `finally` calls first. It uses fuel."""
         return use_fuel
 
     def refuel(self) -> None:
-        """Reset the fuel that has been used to zero."""
+        """Give the program its full fuel again."""
         self.count = itertools.count(1).__next__
 
     def skill(self, name: str, parameters: tuple[ParameterDescription, ...]) -> object:
@@ -178,7 +178,7 @@ class ProgramRun:
     def perform(
         self, name: str, parameters: list[tuple[type | str, ParameterDescription]], values: tuple[Any, ...]
     ) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Execute a skill. Raise TypeError or ValueError for a wrong argument, also a subclass of `str`."""
+        """Execute a skill. Raise TypeError or ValueError for wrong arguments, even subclasses of `str`."""
         for (kind, parameter), value in zip(parameters, values, strict=True):
             given: type = type(value)
             if given is not kind:
@@ -219,7 +219,7 @@ class ProgramRun:
         self.request('"wait",[]')
 
     def request(self, request: str) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Send one request to the engine. Return the value of its reply, or raise the error in it."""
+        """Send a request (JSON for name and arguments). Return the value of the reply, or raise its error."""
         if self.has_reached_limit:
             raise LimitReachedError
         where = f",{_line_at_work()}" if self.is_live else ""
@@ -237,7 +237,7 @@ class ProgramRun:
 
 
 def call_task() -> object:
-    """Call `task_program`. This code runs with the program's names, so no child must compile it."""
+    """Call the program's `task_program`. Only this function's code is used, with the program's names."""
     return task_program()  # type: ignore[name-defined] # noqa: F821 - defined by the program
 
 
@@ -325,7 +325,7 @@ ROBOT_ERROR_CLASSES: dict[str, type[SkillError]] = {}
 
 
 def robot_error(number: int, kind: str, text: str) -> SkillError:
-    """Return the exception for the engine's robot error with this number. Each kind has its own class."""
+    """Return the exception that the program gets for robot error `number`. Each `kind` has its own class."""
     if kind not in ROBOT_ERROR_CLASSES:
         ROBOT_ERROR_CLASSES[kind] = type(kind, (SkillError,), {"__module__": "robot"})
     ROBOT_ERROR_CLASSES[kind].number = number

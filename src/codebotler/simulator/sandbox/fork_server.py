@@ -53,7 +53,10 @@ def get_ready() -> tuple[socket, ProgramRun, Callable[[ProgramRun], None], Filte
 def serve(
     door: socket, run: Run, execute: Callable[[Run], None], seccomp: Filter | None, seconds: int
 ) -> None:
-    """Fork a child for each run that the engine requests, one at a time, until the engine hangs up."""
+    """Fork a child for each request of the engine at the `door`, one at a time, until the engine hangs up.
+
+    Each child calls `execute` with `seccomp` in force and `seconds` of processor time.
+    """
     gc.collect()
     gc.freeze()
     _report(0 if seccomp is None else 1)
@@ -116,7 +119,7 @@ def _end_of(pid: int) -> int:
 
 
 def isolate(descriptor: int, seccomp: Filter | None, seconds: int, parent: bytes) -> None:
-    """Isolate the forked child: make a socket its channel, and apply the limits and seccomp."""
+    """Isolate this child of the process `parent`: keep only a socket open, limit its time, use seccomp."""
     os.dup2(descriptor, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     die_with_parent()

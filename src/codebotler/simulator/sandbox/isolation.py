@@ -28,7 +28,7 @@ def give_up_rights(memory: int = MEMORY) -> None:
 
 
 def enclose(seccomp: Filter | None, seconds: int) -> None:
-    """Leave only the channel open, and limit processor time to `seconds`. Call `give_up_rights` first."""
+    """Forbid new processes and files, limit processor time, use `seccomp`. Call `give_up_rights` first."""
     set_limit("NPROC", 0)
     set_limit("NOFILE", CHANNEL + 1)
     limit_time(seconds)
@@ -53,7 +53,7 @@ def limit_time(seconds: int) -> None:
 
 
 def become_nobody() -> None:
-    """Switch from root, which is exempt from RLIMIT_NPROC, to the user nobody."""
+    """If this process is root, become the user nobody, since the limit of processes exempts root."""
     if os.geteuid() != 0:
         return
     os.setgroups([])
@@ -66,7 +66,7 @@ def become_nobody() -> None:
 
 
 def die_with_parent() -> None:
-    """Die when the thread that started this process ends. A change of the user undoes this setting."""
+    """Let the kernel kill this process when the thread that started it ends. A new user ID undoes this."""
     prctl(PR_SET_PDEATHSIG, SIGKILL)
 
 

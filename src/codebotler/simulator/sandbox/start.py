@@ -19,7 +19,7 @@ ADDR_NO_RANDOMIZE = 0x0040000
 
 
 def main(descriptors: list[str]) -> None:
-    """Restart the interpreter with the given descriptors, or serve if there are none, as after a restart."""
+    """Restart Python with these descriptors. After the restart, without arguments, run the fork server."""
     if descriptors:
         start_again(list(map(int, descriptors)))
     sys.pycache_prefix = os.devnull  # a bytecode file that may or may not exist would move the heap
@@ -56,7 +56,7 @@ class _CompiledModules:
         """Leave the creation of the module to Python."""
 
     def exec_module(self, module: types.ModuleType) -> None:
-        """Run a module's code, and discard it."""
+        """Run a module's compiled code, and forget the code to save memory."""
         name, spec = module.__name__, module.__spec__
         if spec is not None and name.partition(".")[0] != "codebotler":
             module.__file__ = spec.origin = f"{name}.py"
@@ -80,7 +80,7 @@ def start_again(descriptors: list[int]) -> NoReturn:
 
 
 def arrange(descriptors: list[int]) -> None:
-    """Give descriptors the numbers from FIRST_DESCRIPTOR on, and close all others after them."""
+    """Renumber open descriptors from FIRST_DESCRIPTOR on, and close all higher ones."""
     from fcntl import F_DUPFD, fcntl  # noqa: PLC0415 - not needed after the restart
 
     end = FIRST_DESCRIPTOR + len(descriptors)

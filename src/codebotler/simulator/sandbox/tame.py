@@ -91,7 +91,7 @@ def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
 
 
 class ProgramVerifier:
-    """Raises WildError for a part of a program that is not allowed. `ALLOWED` has a check for each node."""
+    """Checks the syntax tree of a program. `ALLOWED` maps each type of node to the method that checks it."""
 
     def __init__(self, nodes: Nodes, skills: frozenset[str]) -> None:
         self.skills = skills
@@ -110,7 +110,7 @@ class ProgramVerifier:
             wild()
 
     def is_data(self, name: str) -> bool:
-        """Return whether a name refers to data in the current function, or to nothing."""
+        """Return whether a name in the current function can only be data, not a function or builtin."""
         if name in self.functions:
             return False
         if name not in self.special:

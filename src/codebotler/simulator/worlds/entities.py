@@ -14,7 +14,7 @@ NO_WORDS: frozenset[str] = frozenset()
 
 @dataclass
 class Thing:
-    """An object in a room."""
+    """An object in a room: its label, and the words that describe it."""
 
     label: str
     is_pattern: bool = True  # whether the label is a regex, and not the literal name of a thing put down
@@ -35,7 +35,7 @@ class Thing:
 
 
 class Somebody:
-    """A person in a room, and the answers they have left."""
+    """A person in a room, and the answers that this person can still give."""
 
     def __init__(self, person: Person, traits: frozenset[str] = frozenset()) -> None:
         self.person, self.traits = person, traits

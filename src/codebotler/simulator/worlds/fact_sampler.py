@@ -68,7 +68,7 @@ class FactSampler:
 
 @dataclass(frozen=True)
 class Draw:
-    """A random fact: its kind, its arguments of `FactSampler.decide`, and its result (a position or bool)."""
+    """A chosen fact: method and arguments for `FactSampler.decide`, and the result (a position or bool)."""
 
     method: DrawMethod
     arguments: tuple[Any, ...]
@@ -81,5 +81,5 @@ class Draw:
         return [replace(self, result=result) for result in results if result != self.result]
 
     def holds_in(self, sampler: FactSampler) -> bool:
-        """Return whether a sampler, which stands for a world, decides this fact in the same way."""
+        """Return whether this fact has the same result in the world of another sampler."""
         return sampler.decide(self.method, *self.arguments).result == self.result

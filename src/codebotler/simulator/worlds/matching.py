@@ -37,12 +37,12 @@ _FILLERS = frozenset(
 
 
 def is_in_request(label: str, request: str) -> bool:
-    """Return whether a world's label, which is a regex, matches in a program's request."""
+    """Return whether a world's label, which is a regex, matches anywhere in a program's request."""
     return _pattern(label).search(request) is not None
 
 
 def finds(request: str, label: str, matching: Matching) -> bool:
-    """Return whether a label, which is a regex, equals a program's request or matches a part of it."""
+    """Return whether a label (a regex) equals a request or matches in it, as the suite's `matching` says."""
     pattern = label if matching == "label-in-request" else whole_words(label)
     return is_in_request(pattern, request) or request.lower() == label.lower()
 
@@ -73,7 +73,7 @@ _WORD = re.compile(r"[\w'\u2019-]+")
 
 
 def meant_by(request: str, labels: Iterable[str], *, plain: bool = False) -> list[str]:
-    """Return the label that equals a request, or else the labels that match most of the request's words.
+    """Return the label that equals a request, or else those that match the largest number of its words.
 
     `labels` are regexes, as in world files, or plain names if `plain` is true.
     """

@@ -25,7 +25,7 @@ Setup: TypeAlias = tuple[str, tuple[Any, ...]]  # `simulated` or `sampled`, and 
 
 
 class SkillGuard(Protocol):
-    """Judges each skill call before a robot executes it."""
+    """Decides about each skill call before a robot executes it, as `RuleGuard` does."""
 
     may_refuse: bool
 
@@ -57,7 +57,7 @@ class SimulatedRobot(SimulatedWorld):
         self.setup: Setup = ("simulated", (world, settings))
         missing = () if skills is SKILLS else [name for name, row in skills.items() if row.does is None]
         if missing:
-            raise UserError(f'the skill "{missing[0]}" cannot be simulated because it has no code')
+            raise UserError(f'the skill "{missing[0]}" cannot be simulated because it has no code; add code')
         self.held: str | None = None
         self.taken: Thing | None = None
         self.now, self.is_live = 0.0, False
@@ -166,7 +166,7 @@ class SimulatedRobot(SimulatedWorld):
         self.held, self.taken = obj, thing
 
     def put(self, obj: str) -> None:
-        """Put down the held object by the name used to pick it up (or, for `as-happened`, any that fits)."""
+        """Put down the held object. `obj` must be the name used to pick it up (`as-happened`: must fit)."""
         taken = self.taken if self.settings.events == "as-happened" else None
         is_meant = taken is not None and taken.is_meant_by(obj, self.settings.matching)
         if self.held is None or (self.held != obj and not is_meant):
@@ -207,7 +207,7 @@ class SimulatedRobot(SimulatedWorld):
         return results[number]
 
     def fail(self, kind: str) -> NoReturn:
-        """Raise RobotError of a kind that the current skill declares in `fails`, or else UserError."""
+        """Raise a RobotError of this kind, or UserError if the skill does not declare the kind in `fails`."""
         row = self._own_skill
         if row is None:
             raise UserError(f'`fail("{kind}")` was called outside a skill; call it only in a skill')

@@ -14,7 +14,7 @@ from codebotler.simulator.worlds.matching import goals_meant
 
 @dataclass(frozen=True)
 class RoomMap:
-    """The rooms, names, properties and past events that are known before random facts are chosen.
+    """What is known of a world before random facts are chosen: rooms, names, properties and past events.
 
     Args:
         rooms: the names of the rooms, in the order in which the robot lists them.

@@ -32,7 +32,7 @@ class SampledFact:
 
 
 def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True) -> SampledFact:
-    """Return the fact that a person or thing is, or is not, in a room. `normalized` returns such names."""
+    """Return the fact that a person or thing is, or is not, in a room. `name` must be `normalized`."""
     if name == SOMEBODY:
         return SampledFact(f'{SOMEBODY if is_there else "nobody"} is in "{{}}"', (room,), is_random)
     return SampledFact(f'"{{}}" {"is" if is_there else "is not"} in "{{}}"', (name, room), is_random)
@@ -57,7 +57,7 @@ class ExploredRoom:
 
 @dataclass
 class RoomSearch:
-    """The rooms in which a program looked for a person or thing."""
+    """The rooms in which a program looked for a person or thing: those without it and those with it."""
 
     rooms_without: set[str] = field(default_factory=set)
     rooms_with: set[str] = field(default_factory=set)

@@ -120,7 +120,7 @@ class SampledRobot(SimulatedRobot):
 
     @contextmanager
     def excuse_errors(self, *, is_excusable: bool) -> Iterator[None]:
-        """Excuse the program for a RobotError raised in this context, except in strict worlds."""
+        """Add a RobotError in this context to `excuses` if it is excusable and the world is not strict."""
         try:
             yield
         except RobotError as error:
@@ -193,7 +193,7 @@ class SampledRobot(SimulatedRobot):
         return False if is_missed else None
 
     def settle(self, name: str, room: str, *, is_random: bool) -> bool:
-        """Decide and return whether a person or thing is in a room: at random, or True as programs assume."""
+        """Decide whether a person or thing is in a room, at random or else with True. Return the result."""
         is_there = True
         if is_random:
             is_there = bool(self._draw("is_there", room, name))
@@ -219,7 +219,7 @@ class SampledRobot(SimulatedRobot):
         return options[self._draw("answer", len(options), agreeing, *question)]
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], errors: Sequence[str] = ()) -> int:
-        """Return the position, in `outcomes` and then `errors`, of a statement's random but fixed outcome."""
+        """Choose a statement's outcome once, by chance. Return its position in `outcomes` + `errors`."""
         possible = [*outcomes, *errors]
         if statement not in self.outcomes:
             drawn = self.outcomes[statement] = self._draw("outcome", len(possible), statement)
@@ -280,11 +280,11 @@ class SampledRobot(SimulatedRobot):
         return [] if means_anybody(entity) or meant_by(entity, known, plain=True) else fitting
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return things in a room, or anywhere, that fit `is_` if given. Which are there is random."""
+        """Return the things in the room `where` (or anywhere) that fit `is_`. Which are there is random."""
         return self._all_of(self.room_map.things, where, is_ or "thing", is_person=False)
 
     def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:
-        """Return the people `where` (anywhere if empty) who fit `is_` and each trait; presence is random."""
+        """Return the people in the room `where` (or anywhere) who fit `is_` and all traits (by chance)."""
         wanted = " ".join(str(one) for one in (is_, *traits.values()) if one) or SOMEBODY
         return self._all_of(self.room_map.people, where, wanted, is_person=True)
 
@@ -342,7 +342,7 @@ class SampledRobot(SimulatedRobot):
         self.explored[goal].people |= {who, SOMEBODY}
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Ask a person, who is here unless a look failed (if strict, at random). Return a random position."""
+        """Return a random option's position. A person not looked for is here (if strict, only by chance)."""
         person, options = as_text(person), to_options(options)
         who = normalized(person)
         if not options or not self._answers(who):
@@ -373,7 +373,7 @@ class SampledRobot(SimulatedRobot):
         return is_there
 
     def take(self, obj: str) -> None:
-        """Pick up an object. It is here unless a look has not found it; in strict worlds, chance decides."""
+        """Pick up an object. An object not looked for is here (in strict worlds, only by chance)."""
         name = normalized(obj)
         if self.held is None and self.is_here(name) is None and self._lies_there(name):
             self._add(name, self.room)
@@ -391,7 +391,7 @@ class SampledRobot(SimulatedRobot):
         return self.settle(name, self.room, is_random=self.sampler.strict)
 
     def put(self, obj: str) -> None:
-        """Put down the held object, as `SimulatedRobot.put` does."""
+        """Put down the held object. Excuse the program if it searched for the object in vain."""
         with self.excuse_errors(is_excusable=self.held is None and self.search(normalized(obj)).is_lost):
             super().put(obj)
 

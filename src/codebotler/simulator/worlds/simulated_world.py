@@ -57,7 +57,7 @@ class SimulatedWorld:
 
     @cached_property
     def contents(self) -> dict[str, list[Thing]]:
-        """The objects in each room and place, by its name."""
+        """The objects in each room and place, by the name of the room or place."""
         rooms, words = self.world.rooms, self._trait_words
         return {
             room.name: [Thing(one, traits=words.get(one, NO_WORDS)) for one in room.objects] for room in rooms
@@ -69,7 +69,7 @@ class SimulatedWorld:
 
     @cached_property
     def occupants(self) -> dict[str, list[Somebody]]:
-        """The people in each room and place, by its name, including people who arrive later."""
+        """The people in each room and place, by the name of the place, including those who arrive later."""
         rooms, words = self.world.rooms, self._trait_words
         return {r.name: [Somebody(one, words.get(one.name, NO_WORDS)) for one in r.people] for r in rooms}
 
@@ -101,7 +101,7 @@ class SimulatedWorld:
         return next((room.within for room in self.world.rooms if room.name == goal), "") or goal
 
     def possible_rooms(self, request: str) -> Sequence[str]:
-        """Return all rooms that a request may mean. A room's exact name may also fit other labels."""
+        """Return all rooms that a request may mean. Even a room's exact name may mean another room too."""
         if self.settings.matching == "longest-name":
             around = {room.name: room.within for room in self.world.rooms if room.within}
             return goals_meant(request, self.goals, around)
@@ -144,13 +144,13 @@ class SimulatedWorld:
         return {statement.casefold(): value for statement, value in self.world.truths}
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return the names of the things `where` (anywhere if empty) that fit `is_` (all things if empty)."""
+        """Return the names of the things in the room `where` (or anywhere) that fit the description `is_`."""
         found = [thing for goal in self._goals_in(where) for thing in self.contents[goal]]
         fitting = (one for one in found if not is_ or best_fits(is_, [one.entity], WORDS_FOR_THINGS))
         return [thing.label for thing in fitting]
 
     def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:
-        """Return the names of the people `where` (anywhere if empty) who fit `is_` and each trait."""
+        """Return the names of the people in the room `where` (or anywhere) who fit `is_` and all traits."""
         around = self._room_around(self.goal_of(where)) if where else ""
         found = [one for goal in self._goals_in(around) for one in self.occupants[goal] if one.is_here]
         wanted = [str(one) for one in (is_, *traits.values()) if one]
@@ -182,7 +182,7 @@ class SimulatedWorld:
         words = self.settings.words_for_people or WORDS_FOR_PEOPLE
         meant = best_fits(name, [one.entity for one in everybody], words)
         if len(meant) != 1:
-            raise RobotError("AskNoPerson", f'"{name}" cannot be moved: use a name that fits one person')
+            raise RobotError("AskNoPerson", f'"{name}" cannot be moved; use a name that fits one person')
         for here in self.occupants.values():
             here[:] = [one for one in here if one is not everybody[meant[0]]]
         self.occupants[goal].append(everybody[meant[0]])

@@ -22,7 +22,7 @@ ENDS = ast.Break | ast.Continue | ast.Return
 
 
 def before_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Runs the code that follows a loop before the loop's last iteration."""
+    """Yield each edit that moves the last iteration of a loop behind the code that follows the loop."""
     for block in program.blocks:
         for at, loop in enumerate(block):
             after = block[at + 1 :]
@@ -53,7 +53,7 @@ def _negated(test: ast.expr) -> ast.expr:
 
 
 def negate_a_condition(program: ProgramTree, _: Context) -> Edits:
-    """Negates a condition, or one operand of `and` or `or` in a condition."""
+    """Yield each edit that negates a condition, or one operand of `and` or `or` in a condition."""
     for test in _tests(program):
         yield {test: _negated(test)}
         if isinstance(test, ast.BoolOp):
@@ -61,7 +61,7 @@ def negate_a_condition(program: ProgramTree, _: Context) -> Edits:
 
 
 def drop_a_condition(program: ProgramTree, _: Context) -> Edits:
-    """Replaces a condition with true, so that the program always acts."""
+    """Yield each edit that replaces a condition with true, so that the program always acts."""
     of_loops = {loop.test for loop in program.loops if isinstance(loop, ast.While)}  # loops would never end
     for test in _tests(program):
         if test not in of_loops and not isinstance(test, ast.Constant):
@@ -73,14 +73,14 @@ def drop_a_condition(program: ProgramTree, _: Context) -> Edits:
 
 
 def never(program: ProgramTree, _: Context) -> Edits:
-    """Replaces a condition with false, so that the program never acts."""
+    """Yield each edit that replaces a condition with false, so that the program never acts."""
     for test in _tests(program):
         if not (isinstance(test, ast.Constant) and test.value is False):
             yield {test: expression("False")}
 
 
 def and_or(program: ProgramTree, _: Context) -> Edits:
-    """Swaps `and` and `or`."""
+    """Yield each edit that replaces `and` with `or`, or the reverse."""
     for node in program.nodes:
         match node:
             case ast.BoolOp(junction, values) if {*map(skill_of, values)} != {"is_in_room"}:
@@ -88,7 +88,7 @@ def and_or(program: ProgramTree, _: Context) -> Edits:
 
 
 def drop_the_else(program: ProgramTree, _: Context) -> Edits:
-    """Removes the `else` branch of a condition."""
+    """Yield each edit that removes the `else` branch of a condition."""
     for node in program.nodes:
         match node:
             case ast.If(test, body, [_, *_] as otherwise) if not all(map(is_pause, otherwise)):
@@ -96,7 +96,7 @@ def drop_the_else(program: ProgramTree, _: Context) -> Edits:
 
 
 def swap_steps(program: ProgramTree, _: Context) -> Edits:
-    """Swaps two consecutive steps."""
+    """Yield each edit that swaps two consecutive steps."""
     idle = {statement for statement, _ in program.steps("is_in_room")}
     for block in program.blocks:
         for first, second in pairwise(block):
@@ -109,7 +109,7 @@ def swap_steps(program: ProgramTree, _: Context) -> Edits:
 
 
 def stop_at_the_first(program: ProgramTree, _: Context) -> Edits:
-    """Ends a loop after the first iteration or match."""
+    """Yield each edit that ends a loop after the first iteration or match."""
     for loop in program.loops:
         last = loop.body[-1]
         yield {last: [last, ast.Break()]}
@@ -130,7 +130,7 @@ def _inside(block: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def do_not_stop(program: ProgramTree, _: Context) -> Edits:
-    """Removes a `break`, `continue` or `return`."""
+    """Yield each edit that removes a `break`, `continue` or `return`."""
     for node in program.nodes:
         match node:
             case ast.Break() | ast.Continue() | ast.Return(value=None):
@@ -138,7 +138,7 @@ def do_not_stop(program: ProgramTree, _: Context) -> Edits:
 
 
 def give_up(program: ProgramTree, _: Context) -> Edits:
-    """Ends a `while` loop, such as one that waits, after one or three iterations."""
+    """Yield each edit that ends a `while` loop, such as one that waits, after one or three iterations."""
     for loop in program.loops:
         if isinstance(loop, ast.While):
             endless = isinstance(loop.test, ast.Constant) and loop.test.value
@@ -149,7 +149,7 @@ def give_up(program: ProgramTree, _: Context) -> Edits:
 
 
 def stop_half_way(program: ProgramTree, _: Context) -> Edits:
-    """Ends the program before all steps are done."""
+    """Yield each edit that ends the program before all steps are done."""
     for node in program.nodes:
         if isinstance(node, ast.FunctionDef) and node.name == TASK_FUNCTION:
             doing = [s for s in node.body[:-1] if skills_in(s) and not isinstance(s, ast.Return)]
@@ -157,7 +157,7 @@ def stop_half_way(program: ProgramTree, _: Context) -> Edits:
 
 
 def into_the_loop(program: ProgramTree, _: Context) -> Edits:
-    """Moves code that belongs after a loop into its body."""
+    """Yield each edit that moves the code after a loop into its body."""
     for block in program.blocks:
         for loop, after in pairwise(block):
             if isinstance(loop, ast.For | ast.While) and skills_in(after):
@@ -166,7 +166,7 @@ def into_the_loop(program: ProgramTree, _: Context) -> Edits:
 
 
 def out_of_the_block(program: ProgramTree, _: Context) -> Edits:
-    """Moves the last step of a loop or a condition out of its body."""
+    """Yield each edit that moves the last step of a loop or a condition out of its body."""
     for node in program.nodes:
         match node:
             case ast.For(body=[_, *_, last]) | ast.While(body=[_, *_, last]) | ast.If(body=[_, *_, last]):

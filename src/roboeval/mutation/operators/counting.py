@@ -11,7 +11,7 @@ BOUNDARIES = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt
 
 
 def off_by_one(program: ProgramTree, _: Context) -> Edits:
-    """Increases or decreases a number by one."""
+    """Yield each edit that increases or decreases a number by one."""
     exact = {inner for node in program.nodes if _is_exact(node) for inner in ast.walk(node)}
     pauses = {inner for node in program.nodes if is_pause(node) for inner in ast.walk(node)}
     for node in program.nodes:
@@ -35,7 +35,7 @@ def _is_exact(node: ast.AST) -> bool:
 
 
 def wrong_boundary(program: ProgramTree, _: Context) -> Edits:
-    """Includes or excludes the boundary value of a comparison."""
+    """Yield each edit that includes or excludes the boundary value of a comparison."""
     for node in program.nodes:
         match node:
             case ast.Compare(left, [comparison], right) if type(comparison) in BOUNDARIES:
@@ -43,7 +43,7 @@ def wrong_boundary(program: ProgramTree, _: Context) -> Edits:
 
 
 def miscount(program: ProgramTree, _: Context) -> Edits:
-    """Increases or decreases the result of a count by one."""
+    """Yield each edit that increases or decreases the result of a count, such as `len`, by one."""
     for node in program.nodes:
         match node:
             case ast.Call(ast.Name("len" | "sum") | ast.Attribute(_, "count"), [_, *_]):
@@ -52,7 +52,7 @@ def miscount(program: ProgramTree, _: Context) -> Edits:
 
 
 def forget_to_count(program: ProgramTree, _: Context) -> Edits:
-    """Removes an update of a counter or a collection."""
+    """Yield each edit that removes an update of a counter or a collection."""
     return ({node: []} for node in program.nodes if _remembers(node))
 
 
@@ -68,7 +68,7 @@ def _remembers(node: ast.AST) -> bool:
 
 
 def only_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Keeps only the last item instead of adding it to the previous ones."""
+    """Yield each edit that keeps only the last item instead of adding it to the previous ones."""
     for node in program.nodes:
         match node:
             case ast.AugAssign(target, ast.Add(), value):
@@ -82,7 +82,7 @@ def only_the_last(program: ProgramTree, _: Context) -> Edits:
 
 
 def wrong_sign(program: ProgramTree, _: Context) -> Edits:
-    """Swaps addition and subtraction."""
+    """Yield each edit that replaces an addition with a subtraction, or the reverse."""
     for node in program.nodes:
         match node:
             case ast.AugAssign(target, ast.Add(), ast.Constant(int()) as value):
@@ -96,7 +96,7 @@ def wrong_sign(program: ProgramTree, _: Context) -> Edits:
 
 
 def add_as_texts(program: ProgramTree, _: Context) -> Edits:
-    """Concatenates digits instead of adding numbers."""
+    """Yield each edit that joins numbers as text instead of adding them."""
     edit: dict[ast.AST, ast.AST] = {}
     names: set[str] = set()
     for node in program.nodes:
@@ -113,7 +113,7 @@ def add_as_texts(program: ProgramTree, _: Context) -> Edits:
 
 
 def reset_in_the_loop(program: ProgramTree, _: Context) -> Edits:
-    """Resets a counter or a collection in each iteration of a loop."""
+    """Yield each edit that resets a counter or a collection in each iteration of a loop."""
     for block in program.blocks:
         for at, loop in enumerate(block):
             if isinstance(loop, ast.For | ast.While):

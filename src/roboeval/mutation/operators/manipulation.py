@@ -23,17 +23,17 @@ def _is_put_down(context: Context) -> bool:
 
 @only_if(_is_put_down)
 def forget_to_place(program: ProgramTree, _: Context) -> Edits:
-    """Removes the step that puts an object down."""
+    """Yield each edit that removes a step that puts down an object."""
     return ({step: []} for step, _call in program.steps("place"))
 
 
 def forget_to_pick(program: ProgramTree, _: Context) -> Edits:
-    """Removes the step that picks an object up."""
+    """Yield each edit that removes a step that picks up an object."""
     return ({step: []} for step, _call in program.steps("pick"))
 
 
 def bring_nothing(program: ProgramTree, _: Context) -> Edits:
-    """Removes all steps that pick up or put down objects."""
+    """Yield each edit that removes all steps that pick up or put down objects."""
     steps = [step for step, _ in program.steps("pick", "place")]
     if len(steps) > 1:
         yield {step: [] for step in steps}
@@ -41,12 +41,12 @@ def bring_nothing(program: ProgramTree, _: Context) -> Edits:
 
 @only_if(_is_put_down)
 def place_by_words(program: ProgramTree, _: Context) -> Edits:
-    """Announces that an object was brought instead of putting it down."""
+    """Yield each edit that replaces a step that puts down an object with a message that it is here."""
     return ({step: statement('say("Here it is.")')} for step, _call in program.steps("place"))
 
 
 def wrong_thing(program: ProgramTree, context: Context) -> Edits:
-    """Replaces an object with a different one."""
+    """Yield each edit that replaces an object with a different one."""
     things = [argument(call, 0) for _, call in program.steps("pick", "place")]
     named = next((name for thing in things if (name := text_of(thing))), "")
     if len(context.things) > 1 and things:
@@ -56,7 +56,7 @@ def wrong_thing(program: ProgramTree, context: Context) -> Edits:
 
 
 def place_where_found(program: ProgramTree, _: Context) -> Edits:
-    """Puts an object down immediately after picking it up."""
+    """Yield each edit that makes the robot put down an object immediately after picking it up."""
     places = [step for step, _ in program.steps("place")]
     for step, call in program.steps("pick"):
         thing = argument(call, 0)

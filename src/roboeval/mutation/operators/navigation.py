@@ -35,12 +35,12 @@ def _sequences(program: ProgramTree) -> Iterator[ast.expr]:
 
 
 def skip_the_first(program: ProgramTree, _: Context) -> Edits:
-    """Skips the first item of a sequence, such as a room, a person or a report."""
+    """Yield each edit that removes the first item of a sequence, such as a room, a person or a report."""
     return ({items: expression("list(items)[1:]", items=items)} for items in _sequences(program))
 
 
 def skip_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Skips the last item of a sequence, such as the last room."""
+    """Yield each edit that removes the last item of a sequence, such as the last room."""
     return ({items: expression("list(items)[:-1]", items=items)} for items in _sequences(program))
 
 
@@ -57,19 +57,19 @@ def _return_places(program: ProgramTree) -> dict[ast.Call, ast.expr]:
 
 @only_if(COMING_BACK)
 def drop_the_return(program: ProgramTree, _: Context) -> Edits:
-    """Removes the drive back to the starting point."""
+    """Yield each edit that removes the drive back to the starting point."""
     returns = _return_places(program)
     return ({step: []} for step, call in program.steps("go_to") if call in returns)
 
 
 def drop_a_drive(program: ProgramTree, _: Context) -> Edits:
-    """Removes a drive, but not the drive back to the starting point."""
+    """Yield each edit that removes a drive, but not the drive back to the starting point."""
     returns = _return_places(program)
     return ({step: []} for step, call in program.steps("go_to") if call not in returns)
 
 
 def wrong_room(program: ProgramTree, context: Context) -> Edits:
-    """Replaces the name of a room with the name of another room."""
+    """Yield each edit that replaces the name of a room with the name of another room."""
     for node in program.nodes:
         room = (text_of(node) or "").lower().removeprefix("the ")
         if room in {one.lower() for one in context.rooms}:
@@ -78,26 +78,26 @@ def wrong_room(program: ProgramTree, context: Context) -> Edits:
 
 @only_if(COMING_BACK)
 def return_elsewhere(program: ProgramTree, context: Context) -> Edits:
-    """Returns to a room other than the starting point."""
+    """Yield each edit that makes the robot return to a room other than the starting point."""
     rooms = dict.fromkeys((*context.rooms[:1], *context.idle_rooms(program)[-1:]))
     return ({place: ast.Constant(room)} for place in _return_places(program).values() for room in rooms)
 
 
 @only_if(COMING_BACK)
 def return_to_here(program: ProgramTree, _: Context) -> Edits:
-    """Replaces the drive back with a drive to the current location."""
+    """Yield each edit that replaces the drive back with a drive to the current location."""
     return ({place: expression("get_current_location()")} for place in _return_places(program).values())
 
 
 def drive_by_words(program: ProgramTree, _: Context) -> Edits:
-    """Announces a drive instead of driving."""
+    """Yield each edit that replaces a drive with a message that announces it."""
     for step, call in program.steps("go_to"):
         if (place := argument(call, 0)) is not None:
             yield {step: statement('say(f"I am going to {place}")', place=place)}
 
 
 def one_drive_for_all(program: ProgramTree, _: Context) -> Edits:
-    """Passes all rooms to a single drive, which reaches only one of them."""
+    """Yield each edit that passes all rooms to a single drive, which reaches only one of them."""
     for loop in program.loops:
         if not isinstance(loop, ast.For) or not isinstance(loop.target, ast.Name):
             continue
@@ -110,14 +110,14 @@ def one_drive_for_all(program: ProgramTree, _: Context) -> Edits:
 
 @only_if(STAYING_OUT)
 def detour(program: ProgramTree, context: Context) -> Edits:
-    """Adds a drive through a room that the instruction does not mention."""
+    """Yield each edit that adds a drive to a room that the program does not mention."""
     last = [step for step, _ in program.steps("go_to")][-1:]
     for room in context.idle_rooms(program)[:1]:
         yield from ({step: [statement(f"go_to({room!r})"), step]} for step in last)
 
 
 def plural_rooms(program: ProgramTree, _: Context) -> Edits:
-    """Searches room names for the plural of a word, such as `labs` instead of `lab`."""
+    """Yield each edit that replaces a searched word with its plural, such as `lab` with `labs`."""
     for node in program.nodes:
         match node:
             case ast.Compare(ast.Constant(str(word)) as left, [ast.In() | ast.NotIn()], [_]):
@@ -147,17 +147,17 @@ def _looks_in_loops(program: ProgramTree) -> Iterator[tuple[ast.For | ast.While,
 
 
 def drop_the_look(program: ProgramTree, _: Context) -> Edits:
-    """Assumes that a person or thing is present, without looking."""
+    """Yield each edit that replaces a look with true, so that a person or thing counts as present."""
     return ({call: expression("True")} for call in _looks(program))
 
 
 def see_nothing(program: ProgramTree, _: Context) -> Edits:
-    """Assumes that a person or thing is absent, without looking."""
+    """Yield each edit that replaces a look with false, so that a person or thing counts as absent."""
     return ({call: expression("False")} for call in _looks(program))
 
 
 def look_once(program: ProgramTree, _: Context) -> Edits:
-    """Looks once before a loop instead of in each iteration."""
+    """Yield each edit that moves a look out of a loop, so that the robot looks only once, before the loop."""
     for loop, look in _looks_in_loops(program):
         if text_of(argument(look, 0)) is not None:
             first = statement("seen_once = look", look=look)
@@ -165,7 +165,7 @@ def look_once(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_at_first_only(program: ProgramTree, _: Context) -> Edits:
-    """Looks only in the first two iterations of a loop, then assumes success."""
+    """Yield each edit that lets a loop look only in two iterations, and then assume success."""
     for loop, look in _looks_in_loops(program):
         after = rewrite(loop, {look: expression("turns > 2 or look", look=look)})
         after.body.insert(0, statement("turns += 1"))
@@ -173,7 +173,7 @@ def look_at_first_only(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_afterwards(program: ProgramTree, _: Context) -> Edits:
-    """Acts before looking, so that what the robot sees makes no difference."""
+    """Yield each edit that makes the robot act before it looks, so that what it sees makes no difference."""
     looks = set(_looks(program))
     for node in program.nodes:
         match node:
@@ -184,7 +184,7 @@ def look_afterwards(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_for_another(program: ProgramTree, context: Context) -> Edits:
-    """Looks for a different person or thing."""
+    """Yield each edit that replaces the person or thing that the robot looks for with another one."""
     for look in _looks(program):
         wanted = argument(look, 0)
         if (name := text_of(wanted)) is None:
@@ -196,7 +196,7 @@ def look_for_another(program: ProgramTree, context: Context) -> Edits:
 
 
 def look_at_the_name(program: ProgramTree, _: Context) -> Edits:
-    """Searches in the name of a room instead of in the room itself."""
+    """Yield each edit that replaces a look into a room with a search in the name of the room."""
     for loop, look in _looks_in_loops(program):
         wanted = argument(look, 0)
         if isinstance(loop, ast.For) and isinstance(loop.target, ast.Name) and wanted is not None:

@@ -70,7 +70,7 @@ def _used(program: ProgramTree) -> Iterator[tuple[ast.Call, ast.expr]]:
 
 
 def ignore_the_answer(program: ProgramTree, _: Context) -> Edits:
-    """Asks a question, but ignores the answer and assumes a fixed one."""
+    """Yield each edit that replaces the answer to a question with a fixed one; the robot still asks."""
     return (
         {call: expression("(question, answer)[1]", question=call, answer=answer)}
         for call, answer in _used(program)
@@ -78,12 +78,12 @@ def ignore_the_answer(program: ProgramTree, _: Context) -> Edits:
 
 
 def assume_the_answer(program: ProgramTree, _: Context) -> Edits:
-    """Replaces a question by a fixed answer, without asking."""
+    """Yield each edit that replaces a question with a fixed answer, so that the robot does not ask."""
     return ({call: answer} for call, answer in _used(program))
 
 
 def ask_by_saying(program: ProgramTree, _: Context) -> Edits:
-    """Says a question instead of asking it, and assumes an answer."""
+    """Yield each edit that replaces a question with a message and a fixed answer."""
     for call in program.calls("ask"):
         question, answer = argument(call, 1), next(_answers(call), None)
         if question is not None and answer is not None:
@@ -91,12 +91,12 @@ def ask_by_saying(program: ProgramTree, _: Context) -> Edits:
 
 
 def drop_a_question(program: ProgramTree, _: Context) -> Edits:
-    """Removes a question whose answer is not used."""
+    """Yield each edit that removes a question whose answer is not used."""
     return ({step: []} for step, _call in program.steps("ask"))
 
 
 def forget_an_option(program: ProgramTree, _: Context) -> Edits:
-    """Removes one of the options of a question."""
+    """Yield each edit that removes one of the options of a question."""
     for call in program.calls("ask"):
         options = argument(call, 2)
         if isinstance(options, ast.List) and len(options.elts) > 1:
@@ -105,7 +105,7 @@ def forget_an_option(program: ProgramTree, _: Context) -> Edits:
 
 
 def vague_question(program: ProgramTree, _: Context) -> Edits:
-    """Replaces a question with one that does not name its subject."""
+    """Yield each edit that replaces a question with one that does not name its subject."""
     for call in program.calls("ask"):
         question, options = argument(call, 1), argument(call, 2)
         offered = [text for node in ast.walk(options) if (text := text_of(node))] if options else []
@@ -114,7 +114,7 @@ def vague_question(program: ProgramTree, _: Context) -> Edits:
 
 
 def wrong_person(program: ProgramTree, context: Context) -> Edits:
-    """Replaces the name of a person with another name."""
+    """Yield each edit that replaces the name of a person with another name."""
     for node in program.nodes:
         text = text_of(node) or ""
         for name in context.people:
@@ -134,13 +134,13 @@ def _compared(program: ProgramTree) -> Iterator[tuple[ast.expr, str]]:
 
 
 def other_spelling(program: ProgramTree, _: Context) -> Edits:
-    """Changes the capitalization of a string that an answer is compared with."""
+    """Yield each edit that changes the capitalization of a string that an answer is compared with."""
     for node, text in _compared(program):
         yield {node: ast.Constant(text.lower() if text[0].isupper() else text.capitalize())}
 
 
 def unknown_option(program: ProgramTree, _: Context) -> Edits:
-    """Compares an answer with an option that was not offered."""
+    """Yield each edit that compares an answer with an option that was not offered."""
     return ({node: ast.Constant("maybe")} for node, _text in _compared(program))
 
 
@@ -171,31 +171,31 @@ def _in_place_of(reported: ast.AST, value: str | float) -> ast.expr:
 
 @only_if(TELLING)
 def forget_to_say(program: ProgramTree, _: Context) -> Edits:
-    """Removes a message that the robot says."""
+    """Yield each edit that removes a message that the robot says."""
     return ({step: []} for step, _call in program.steps("say"))
 
 
 @only_if(TELLING)
 def say_nothing_of_it(program: ProgramTree, _: Context) -> Edits:
-    """Replaces a message with one without information."""
+    """Yield each edit that replaces a message with one without information."""
     return ({step: statement('say("Done.")')} for step, _call in program.steps("say"))
 
 
 @only_if(TELLING)
 def constant_for_a_value(program: ProgramTree, _: Context) -> Edits:
-    """Reports a constant instead of a computed value or an answer."""
+    """Yield each edit that replaces a computed value or an answer in a message with a constant."""
     return ({node: _in_place_of(node, value)} for node in _reported(program) for value in (1, 2, 12))
 
 
 @only_if(TELLING)
 def hedge(program: ProgramTree, _: Context) -> Edits:
-    """Reports several numbers, one of which may be correct."""
+    """Yield each edit that replaces a value in a message with several numbers, one of which may be right."""
     return ({node: _in_place_of(node, "0, 1, 2, 3 or 4")} for node in _reported(program))
 
 
 @only_if(TELLING)
 def leave_out_a_clause(program: ProgramTree, _: Context) -> Edits:
-    """Removes a clause from a message."""
+    """Yield each edit that removes a clause from a message."""
     asked = {inner for call in program.calls("ask") for inner in ast.walk(call)}
     for node in _messages(program):
         clauses = CLAUSES.findall(text_of(node) or "")
@@ -206,7 +206,7 @@ def leave_out_a_clause(program: ProgramTree, _: Context) -> Edits:
 
 @only_if(TELLING)
 def leave_out_a_value(program: ProgramTree, _: Context) -> Edits:
-    """Removes a value from a message."""
+    """Yield each edit that removes a value from a message."""
     for node in _messages(program):
         match node:
             case ast.JoinedStr(parts) if len(parts) > 1:
@@ -221,7 +221,7 @@ def leave_out_a_value(program: ProgramTree, _: Context) -> Edits:
 
 @only_if(TELLING)
 def swap_values(program: ProgramTree, _: Context) -> Edits:
-    """Swaps two values in a message."""
+    """Yield each edit that swaps two values in a message."""
     targets = (node.target for node in program.nodes if isinstance(node, ast.For | ast.comprehension))
     gone_through = {name for target in targets for name in names_in(target, ast.Store)}  # loop variables
     for a, b in _neighbours(program):
@@ -256,7 +256,7 @@ def _added(node: ast.expr) -> Iterator[ast.expr]:
 
 
 def say_the_opposite(program: ProgramTree, _: Context) -> Edits:
-    """Reverses the meaning of a message."""
+    """Yield each edit that reverses the meaning of a message."""
     roots = (*program.calls("ask"), *(node for node in program.nodes if isinstance(node, ast.Compare)))
     no_message = {inner for root in roots for inner in ast.walk(root)}
     for node in _messages(program):
@@ -275,7 +275,7 @@ def _opposite(found: re.Match[str]) -> str:
 
 
 def say_before_asking(program: ProgramTree, _: Context) -> Edits:
-    """Moves a message before the question that it should follow."""
+    """Yield each edit that moves a message before the question that it should follow."""
     for block in program.blocks:
         for at, saying in enumerate(block):
             if "say" not in skills_in(saying) or "ask" in skills_in(saying):
