@@ -56,7 +56,7 @@ class FailureGroup:
 
     @property
     def why(self) -> str:
-        """A sentence that explains why the representative fails. Empty if there is no explanation."""
+        """A sentence that explains why the group's most frequent program fails. Empty if this is unknown."""
         if self.reason["explanation"] is not None:
             return str(self.reason["explanation"])
         return error_sentence(self.reason) if self.reason["error"] else ""
@@ -189,13 +189,13 @@ def _lines(text: str) -> ProgramLines:
 
 
 def similarity(one: Counter[str], other: Counter[str]) -> float:
-    """Compute the Dice coefficient of the lines of two programs, from 0 to 1."""
+    """Return how similar two programs are, from 0 to 1 (Dice coefficient of the counts of their lines)."""
     total = one.total() + other.total()
     return 2 * (one & other).total() / total if total else 1.0
 
 
 def passing_programs(named: Iterable[tuple[str, str]]) -> dict[ProgramLines, str]:
-    """Return a dict from lines to name, given (name, program) pairs. Of equal programs, keep the first."""
+    """Return the names of programs by their lines, given (name, program) pairs. Of equals, keep the first."""
     first: dict[ProgramLines, str] = {}
     for name, program in named:
         first.setdefault(_split(program), name)
@@ -207,7 +207,7 @@ def _split(program: str) -> ProgramLines:
 
 
 def smallest_difference(program: str, candidates: Mapping[ProgramLines, str]) -> Fix | None:
-    """Return the smallest difference to a passing program (a candidate), or None if there are none."""
+    """Return the smallest change that turns a program into one of `candidates`, or None if there are none."""
     lines = _split(program)
     counts = Counter(lines)
 

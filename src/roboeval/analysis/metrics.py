@@ -131,15 +131,12 @@ def pass_at_1(tasks: Iterable[TaskScore]) -> dict[tuple[str, int], float]:
 
 
 def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
-    """Return the mean pass@k over all prompts, with its 95% interval over tasks.
-
-    Raise ValueError if a prompt has fewer than k completions.
-    """
+    """Return mean pass@k over prompts, with its interval over tasks. Raise ValueError if k is too large."""
     return over_tasks((prompt.task, prompt.pass_at(k)) for prompt in prompts_of(tasks))
 
 
 def over_tasks(values: Iterable[tuple[str, float]], *, within: tuple[float, float] = SHARE) -> Estimate:
-    """Return the mean of the values in (task, value) pairs, and its 95% interval over tasks."""
+    """Return the mean of (task, value) pairs, with its 95% interval over tasks, which is cut to `within`."""
     by_task: dict[str, list[float]] = {}
     for task, value in values:
         by_task.setdefault(task, []).append(value)
@@ -147,19 +144,19 @@ def over_tasks(values: Iterable[tuple[str, float]], *, within: tuple[float, floa
 
 
 def share_at_least(values: Sequence[float], threshold: float) -> float:
-    """Return the share of values that are at least `threshold`, which must be above 0."""
+    """Return the share of values that are at least `threshold`, apart from rounding errors."""
     return sum(value >= threshold - ROUNDING_ERROR for value in values) / len(values)
 
 
 def percent(share: float) -> str:
-    """Format a share in whole percent, with "<1" and ">99" for shares that would round to 0 or 100."""
+    """Format a share as percent without the sign, such as "42", or "<1" or ">99" close to 0 or 1."""
     if 0 < share < 0.01:  # noqa: PLR2004 - one percent
         return "<1"
     return ">99" if 0.99 < share < 1 else f"{100 * share:.0f}"  # noqa: PLR2004 - 99 percent
 
 
 def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
-    """Return (threshold, share of values that reach it) pairs, largest threshold first (paper, V.A)."""
+    """Return pairs of a threshold and the share of values that reach it, from 1 down (paper, section V.A)."""
     thresholds = sorted({1.0, *(value for value in values if value > ROUNDING_ERROR)}, reverse=True)
     return [(threshold, share_at_least(values, threshold)) for threshold in thresholds]
 
@@ -167,7 +164,7 @@ def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
 def by_formula(
     clusters: Clusters, *, within: tuple[float, float] = SHARE, over: SamplingUnit = "prompts"
 ) -> Estimate:
-    """Return the mean of all values with a cluster-robust interval, clipped to `within`.
+    """Return the mean of all values with its cluster-robust 95% interval, which is cut to `within`.
 
     The variance of the mean is G / (G - 1) * sum over clusters of (sum of (value - mean))**2 / N**2, for G
     clusters with N values. The interval uses Student's t with G - 1 degrees of freedom. With one value per

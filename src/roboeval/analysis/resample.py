@@ -90,7 +90,7 @@ def count_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
 
 @dataclass(frozen=True)
 class RetryResult:
-    """The result of rejection sampling over all prompts, for one limit on retries."""
+    """The result of rejection sampling over all prompts if each may have at most `retries` retries."""
 
     retries: int
     passed: Estimate  # pass@1
@@ -101,7 +101,7 @@ class RetryResult:
 
 
 def resample(prompts: Sequence[CheckedPrompt], retries: int) -> RetryResult:
-    """Compute the result of rejection sampling for one limit on retries."""
+    """Compute the result of rejection sampling with at most `retries` retries for each program."""
     each = tuple(final_chances(prompt, retries) for prompt in prompts)
     return RetryResult(
         retries=retries,
@@ -119,7 +119,7 @@ def accepted_after(prompts: Sequence[CheckedPrompt], most: int) -> list[float]:
 
 
 def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[str, Any]:
-    """Return the results for each limit on retries, and those of each prompt, as JSON data for `--json`."""
+    """Return the results for each limit on retries, in total and by prompt, as JSON data for `--json`."""
     of_limits = [resample(prompts, retries) for retries in limits]
     return {
         "limits": [

@@ -14,7 +14,7 @@ from roboeval.evaluation.runs.traces import trace_of
 
 @dataclass(frozen=True)
 class TraceQuery:
-    """A search for traces by formula, task and world. A field that is None matches every trace."""
+    """A search for traces by task, world and formula (None: any), or, if `negated`, by violated formula."""
 
     formula: Formula | None = None  # None matches every trace
     negated: bool = False  # whether to find traces that do not satisfy the formula
@@ -33,7 +33,7 @@ class TraceMatch:
 
 
 def search_row(row: Mapping[str, Any], query: TraceQuery) -> TraceMatch:
-    """Return in which worlds a completion matches a query, and in which ones no trace was stored."""
+    """Return in which worlds a completion matches a query, and in which its trace is too long to tell."""
     formula = query.formula
     worlds, cut = [], []
     verdicts = [*_verdicts_in_scope(row, query)]

@@ -35,7 +35,7 @@ def by_bootstrap(
     seed: int = BOOTSTRAP_SEED,
     draws: int = 10_000,
 ) -> Estimate:
-    """Return the mean of all values with a percentile interval from `draws` resamples of the clusters.
+    """Return the mean of all values with its 95% percentile interval from `draws` resamples of the clusters.
 
     Plain percentiles are too narrow for few clusters, so they are expanded by the ratio of Student's t to the
     normal distribution (Hesterberg's expanded percentile interval).
@@ -79,7 +79,7 @@ def p_by_signs(clusters: Clusters, *, seed: int = BOOTSTRAP_SEED, draws: int = 1
 
 @dataclass(frozen=True)
 class SampleSizes:
-    """The sample sizes that detect a difference with 80% power. A size is None if it cannot be computed."""
+    """The numbers of completions per prompt, or of prompts, that detect a difference (80% power), or None."""
 
     completions: int | None  # number per prompt and model, if only these prompts matter
     prompts: int | None  # number of similar prompts, with as many completions per prompt as now

@@ -33,12 +33,12 @@ DRAWS_PER_PROMPT = 20
 
 @dataclass(frozen=True)
 class ClarifySettings:
-    """The settings of `clarify`.
+    """The settings of `clarify`, which lets a simulated person choose among programs.
 
     Args:
-        candidates: the number of candidates in a group, at least 2.
+        candidates: the number of a prompt's programs among which one question decides, at least 2.
         noise: the share of questions that the simulated person answers wrongly.
-        seed: the random seed for groups and answers.
+        seed: the random seed for the choice of the programs and for the answers.
     """
 
     candidates: int = 10
@@ -47,10 +47,10 @@ class ClarifySettings:
 
 
 class ClarifyShares(TypedDict):
-    """Pass rates from 0 to 1 with and without a clarifying question. All prompts count equally.
+    """Pass rates from 0 to 1 without a clarifying question (`one`, `majority`) and with it (`question`).
 
-    `mattered` is the share of questions whose answer changes the verdict, compared with the program of the
-    largest cluster. It is None if no question was asked.
+    `mattered` is the share of questions whose answer changes the verdict from that on `majority`, a program
+    with the most frequent behaviour. It is None if no question was asked.
     """
 
     one: float  # the share of single candidates that pass
@@ -69,7 +69,7 @@ class PromptShares(ClarifyShares):
 
 
 class ClarifyMeasurement(ClarifyShares):
-    """A measurement of a run, with its settings and hashes of the suite (`digest`) and the completions."""
+    """A result of `roboeval clarify`, with its settings and the hashes of the suite and the completions."""
 
     digest: str
     completions: str
@@ -84,8 +84,8 @@ def clarify(
 ) -> Iterator[PromptShares]:
     """Yield pass rates with and without a clarifying question, for each prompt with enough completions.
 
-    Candidates are compared in imagined worlds only. The worlds of the task are only for the verdicts and for
-    the simulated person, who takes the first option that passes.
+    A question is about programs that behave differently in imagined worlds. The worlds of the task are used
+    only for verdicts and by the simulated person, who chooses the first program that passes.
 
     Raises:
         UserError: no prompt has `settings.candidates` completions, or a completion is an agent's mission.
@@ -206,7 +206,7 @@ def store_measurement(run: RunFolder, suite: Suite, data: dict[str, Any]) -> Pat
 
 
 def read_measurements(results: Results) -> Iterator[tuple[ClarifyMeasurement, bool]]:
-    """Yield each measurement of a run, with False if the completions or the suite have changed since then."""
+    """Yield each stored measurement of a run, and whether its completions and suite are still the same."""
     for path in sorted(results.run.questions(results.key or "").glob("*.json")):
         try:
             one = msgspec.json.decode(read_text(path), type=ClarifyMeasurement)

@@ -38,8 +38,8 @@ def evaluate_run(
 
     Rows of other tasks are kept, but `redo` first deletes all rows. If `ablated`, only common sense is
     required. A completion that takes too long to judge gets no row, so that the next evaluation tries again.
-    Pass `completions` if the run has already been read. Raises UserError if the suite or the tool differ from
-    those that judged earlier rows.
+    Pass `completions` if the run has already been read. Raises UserError if earlier rows were judged by
+    another suite, or by other versions of codebotler or Python.
     """
     key = evaluation_key(suite, ablated=ablated)
     with run.writing():
@@ -87,7 +87,7 @@ def _is_in(task: str, tasks: frozenset[str] | None) -> bool:
 def evaluation_metadata(
     suite: Suite, *, ablated: bool = False, tasks: frozenset[str] | None = None
 ) -> dict[str, Any]:
-    """Return the content of KEY.json: the suite and the tool that judge, and the selected tasks or None."""
+    """Return the content of KEY.json: the suite, the versions that judge, and the `tasks` (None: all)."""
     house = suite.house
     return {
         "suite": suite.name,
@@ -106,20 +106,20 @@ def evaluation_metadata(
 
 
 def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
-    """Return the content of KEY.json or None if there is none. Raise UserError if suite or tool changed."""
+    """Return the content of KEY.json, or None without it. Raise UserError if suite or versions differ."""
     key = evaluation_key(suite, ablated=ablated)
     path, rows = run.manifest(key), run.rows(key)
     if not path.exists():
         if rows.exists() and rows.stat().st_size:
             raise UserError(
-                "is missing, so it is unknown how the rows were judged; --redo starts over", file=path
+                "is missing, so it is unknown how the rows were judged; use --redo to judge again", file=path
             )
         return None
     was = load_json_object(path)
     for name, now in evaluation_metadata(suite, ablated=ablated, tasks=None).items():
         if was.get(name) != now and name != "tasks":
             change = f'"{name}" was {_brief(was.get(name))} and is now {_brief(now)}'
-            raise UserError(f"was judged differently: {change}; --redo starts over", file=path)
+            raise UserError(f"was judged differently: {change}; use --redo to judge again", file=path)
     return was
 
 

@@ -54,7 +54,7 @@ def roboeval(
     mode: str = "program",
     max_turns: int | None = None,
 ) -> Task:
-    """Ask for programs for service robots, and judge each in every world of its task. A sample is one prompt.
+    """Ask a model for robot programs, and judge each in every world of its task. A sample is one prompt.
 
     Args:
         suite: the name or folder of a suite.

@@ -46,7 +46,7 @@ class RecordingRobot(SimulatedRobot):
         suite: the suite with the settings, skills and house rules.
         earlier_calls: the calls that it repeats at the start. A call of `SLEEP` lets time pass.
         contracts: limits on its calls; a call outside of them ends the run.
-        fault: the index of the one skill call that fails, counting the earlier calls; None for none.
+        fault: the index, from 0 and including earlier calls, of the one skill call that fails, or None.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class RecordingRobot(SimulatedRobot):
         return result
 
     def sleep_until(self, now: float) -> None:
-        """Let time pass until `now`, in seconds since the start, and add the pause to `lines`."""
+        """Let time pass until the clock shows `now`, in seconds since the start. Add the pause to `lines`."""
         self.calls.append((SLEEP, (now,)))
         self.lines.append(f"{SLEEP}({round(now - self.now, 9)!r})")
         self.try_at = None

@@ -32,7 +32,7 @@ from roboeval.suites.load import Scenario, Suite
 
 @dataclass(frozen=True)
 class FaultResult:
-    """The result of one mission in which one skill call was made to fail."""
+    """The result of a mission in which one skill call was made to fail: how it ended, and its steps."""
 
     task: str
     world: int  # the index of its world
@@ -46,7 +46,7 @@ class FaultResult:
 
 @dataclass(frozen=True)
 class Interruption:
-    """A mission that a failed skill call ended, and what happened before, for the prompt of the rest."""
+    """A mission that a failed skill call ended, with what the prompt for the rest of the mission needs."""
 
     result: FaultResult  # which mission, and which fault
     scenario: Scenario = field(repr=False)  # its world, and what its prompt asks for
@@ -67,7 +67,7 @@ class Interruption:
 
 
 def rest_prompt(past: MissionPast, request: Prompt) -> Prompt:
-    """Return the prompt for the rest of a mission, made from `request`, the prompt for the whole mission."""
+    """Return the prompt for the rest of a mission. `request` is the prompt for the whole mission."""
     last_step = (past.done or [""])[-1]
     return request.to_continue(past.program, past.steps, past.why, past.position_text(past.place), last_step)
 
@@ -101,7 +101,7 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
 def find_first_right(
     worker: Worker, suite: Suite, completions: Iterable[Completion]
 ) -> Iterator[list[Interruption | FaultResult]]:
-    """Yield `find_interruptions` for each completion, but [] after the first right program of its task."""
+    """Yield for each completion its `find_interruptions`, or [] after the first right program of its task."""
     done: set[str] = set()
     for one in completions:
         found = [] if one.task in done else find_interruptions(worker, suite, one)
@@ -110,14 +110,14 @@ def find_first_right(
 
 
 def check_rest(worker: Worker, suite: Suite, program: str, room_map: RoomMap, begun: str) -> CheckResult:
-    """Check a program for the rest of a mission, which `begun` started. It must not repeat steps."""
+    """Check a program for the rest of a mission. It must not repeat steps of the first program, `begun`."""
     settings = CheckSettings(skills=suite.skills, house_rules=suite.house_rules)
     left = remaining_outcomes(begun, room_map, suite.skills, worker=worker)
     return with_repetition_problems(check_on(worker, program, room_map, settings), begun, left)
 
 
 def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: str | None) -> FaultResult:
-    """Check a program for the rest of a mission (None: there is none), run it and judge the whole mission."""
+    """Check and run a program for the rest of a mission (None: missing), and judge the whole mission."""
     if program is None:
         return replace(one.result, end="missing")
     problems = check_rest(worker, suite, program, one.room_map, one.past.program).problems
@@ -144,7 +144,7 @@ def _effects(trace: Trace) -> Counter[str]:
 def write_continuations(
     model: Model, prompts: Sequence[Prompt], concurrency: int, update: Callable[[int, str], None]
 ) -> list[str | None]:
-    """Return a program for each prompt, or None if the model refuses it or has no program recorded.
+    """Return a program for each prompt, or None if the model refuses it or has none recorded for it.
 
     At most `concurrency` requests run at a time. Equal prompts are sent once. `update` is called with the
     number of replies and an empty text. The model is closed at the end.
@@ -171,7 +171,7 @@ def write_continuations(
 
 
 def recovery_data(results: Sequence[FaultResult]) -> dict[str, int | float | None]:
-    """Return counts, shares of continued missions (None without any), and the steps of those that passed."""
+    """Return counts of missions, shares of the continued ones (None without any), and counts of steps."""
     ends = Counter(one.end for one in results)
     passed = [one for one in results if one.end == "passed"]
     continued = len(results) - ends["handled"] - ends["missing"]

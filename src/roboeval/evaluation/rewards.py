@@ -75,7 +75,10 @@ def reward(
 
 @dataclass(frozen=True)
 class Share:
-    """The shares of requirements that a run satisfies in one world. Their product is the world's reward."""
+    """The two factors of a program's reward in a world, `gained` and `kept`, which are shares from 0 to 1.
+
+    `gained` is about requirements not met at the start (None: all are met), `kept` about the others.
+    """
 
     gained: float | None  # satisfied share of the requirements not met at the start, or None
     kept: float  # share of the other requirements still met, halved by an error
@@ -93,7 +96,7 @@ class Share:
 
 @lru_cache(maxsize=160)  # twice the number of prompts in a suite
 def requirements_of(suite: Suite, task: str, prompt: int) -> AskedWorlds:
-    """Return a prompt's requirements in each world, and whether each holds at the start."""
+    """Return a prompt's worlds with their requirements, and whether each requirement holds at the start."""
     asked = [scenario.asked_by(prompt) for scenario in suite.tasks[task].scenarios]
     return [(scenario, [is_met(one, ()) for one in scenario.require]) for scenario in asked]
 
@@ -101,8 +104,8 @@ def requirements_of(suite: Suite, task: str, prompt: int) -> AskedWorlds:
 def total(shares: Sequence[Share]) -> float:
     """Compute a program's reward from its shares in all worlds of a task.
 
-    A world with nothing to gain counts like the mean of the others. If no world has anything to gain, a
-    program that does nothing gets the full reward.
+    Where all requirements hold at the start, the reward is the mean of the other worlds, times the share of
+    requirements still met. If this is so in all worlds, a program that does nothing gets the full reward.
     """
     earned = [share.gained * share.kept for share in shares if share.gained is not None]
     elsewhere = fmean(earned) if earned else 1.0
@@ -132,7 +135,7 @@ class Components:
 
 
 def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bool = True) -> Components:
-    """Compute a program's components from its outcome in each world. If it is valid Python, it `parses`."""
+    """Compute a program's components from its outcome in each world. `parses`: whether it is valid."""
     ran = [(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)]
     reward = total([Share.of(*one) for one in ran])
     kinds = ["" if outcome.error is None else outcome.error.kind for outcome in outcomes]
@@ -147,7 +150,7 @@ def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bo
 
 
 class RewardWork(NamedTuple):
-    """A program whose reward `judge_works` computes."""
+    """A program whose reward `judge_works` computes, with a name that identifies it and its judge."""
 
     name: bytes  # the same for equal programs with equal requirements
     program: str
@@ -177,7 +180,7 @@ def judge_works(works: Sequence[RewardWork], progress: Callable[[int], object] =
 
 
 def judge_batch(works: Sequence[RewardWork]) -> list[Components]:
-    """Run programs and compute their components. The calling thread needs a worker of the shared pool."""
+    """Run programs with this thread's worker of the shared pool, and compute the components of each."""
     worker = shared_pool().here()
     asked = [work.asking() for work in works]
     jobs = [

@@ -127,7 +127,7 @@ def test_changed_rules_cannot_continue_an_evaluation(folder: Path) -> None:
     (folder / "house.yaml").write_text(RULES.replace("3)", "4)"))
     found = refused("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
     assert '"house_rules" was' in found.sentence
-    assert "--redo starts over" in found.sentence
+    assert "use --redo to judge again" in found.sentence
     for command in (("show", "run"), ("report", "run", "--out", "report")):
         found = refused(*command, "--rules", "house.yaml", cwd=folder)
         assert found.file == "house.yaml"

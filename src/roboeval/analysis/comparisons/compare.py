@@ -37,7 +37,7 @@ RunLike = TypeVar("RunLike")
 
 @dataclass(frozen=True)
 class TaskDifference:
-    """The difference in pass@1 between two models on one task."""
+    """The mean pass@1 of two models on one task, and the difference, second minus first."""
 
     task: str
     first: float  # mean pass@1 over common prompts
@@ -95,12 +95,12 @@ def compare_scores(first: PromptScores, second: PromptScores) -> Comparison:
 
 
 def has_missions(table: pl.DataFrame) -> bool:
-    """Whether any completion in a table is an agent's mission, which takes place in a single world."""
+    """Return whether any completion in a table is an agent's mission, which takes place in a single world."""
     return table["ending"].null_count() < table.height
 
 
 def per_mission(table: pl.DataFrame) -> pl.DataFrame:
-    """Return a run's table changed so that each row (a completion in one world) counts as a completion."""
+    """Return a copy of a run's table in which each row (a completion in one world) counts as a completion."""
     kept = pl.col("failure_class").is_in([NO_PROGRAM_CLASS, AGENT_ERROR_CLASS])
     is_check = pl.col("failed_checks").is_not_null()
     is_robots = pl.col("status") == Status.ROBOT_ERROR.value
@@ -117,12 +117,12 @@ def per_mission(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def comparable_tables(*tables: pl.DataFrame) -> Sequence[pl.DataFrame]:
-    """Return the tables changed by `per_mission` if any of them has an agent's missions, or unchanged."""
+    """Return the tables. If any of them contains an agent's missions, change all of them by `per_mission`."""
     return [*map(per_mission, tables)] if any(map(has_missions, tables)) else tables
 
 
 def compare_tables(first: pl.DataFrame, second: pl.DataFrame) -> Comparison:
-    """Compare the tables of two runs on common prompts. If one has missions, count both by `per_mission`."""
+    """Compare two runs on their common prompts. If one table has missions, change both by `per_mission`."""
     found = compare_scores(*(pass_at_1(task_scores(table)) for table in comparable_tables(first, second)))
     if not (has_missions(first) or has_missions(second)):
         return found
@@ -141,7 +141,7 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
 def pairs_to_compare(
     runs: Sequence[RunLike], pass_at_1: Callable[[RunLike], float]
 ) -> list[tuple[RunLike, RunLike]]:
-    """Return all pairs of runs. If there are more than 10, pair each run only with the best by pass@1."""
+    """Return all pairs of runs. If these are more than 10, pair each run only with the best by pass@1."""
     pairs = list(combinations(runs, 2))
     if len(pairs) <= MAX_PAIRS:
         return pairs
@@ -184,7 +184,7 @@ MISSIONS_COMPARED = "each program or agent in each world counts as one mission"
 
 
 def other_differences(first: Results, second: Results) -> list[str]:
-    """Describe what else differs between two runs, such as "temperature differs: 0.2 and 1.0"."""
+    """Describe differences between two runs' settings, such as "temperature differs: 0.2 and 1.0"."""
     runs, found = (first, second), []
     modes = [run.about.get("mode", "program") for run in runs]
     if modes[0] != modes[1]:
@@ -210,7 +210,7 @@ def _short(value: object) -> str:
 
 
 def failure_shares(table: pl.DataFrame) -> dict[str, float]:
-    """Return the share of judged completions that fail, for each class of failure."""
+    """Return for each class of failure, by name, the share of judged completions that fail with it."""
     return {one.name: one.share for one in failures(tally_of(table))}
 
 
@@ -239,7 +239,7 @@ def _ends(estimate: Estimate) -> dict[str, float]:
 
 
 def sample_size_sentences(comparison: Comparison) -> list[str]:
-    """Return sentences on how many completions would detect this difference; none for missions."""
+    """Say how many completions or prompts would detect the difference. Return [] for agents' missions."""
     sizes = comparison.sample_sizes
     if comparison.counts_missions:
         return []

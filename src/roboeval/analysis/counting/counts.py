@@ -17,7 +17,7 @@ Tally: TypeAlias = Counter[tuple[str, int, bool, str | None, str | None]]
 
 
 def outcome_of(row: Row) -> tuple[str, int, bool, str | None, str | None]:
-    """Return a row's key in a `Tally`. Its failure class and kind are None if the completion passed."""
+    """Return a row's key in a `Tally`: task, prompt, whether it passed, and the failure's class and kind."""
     why = row["failure"]
     failed = (None, None) if why is None else (why["class"], why["kind"])
     return row["task"], row["prompt"], why is None, *failed
@@ -36,7 +36,7 @@ def tally_of(table: pl.DataFrame) -> Tally:
 
 
 def scores_of(tally: Tally, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-    """Compute the scores of tasks and prompts (paper, section IV.C). Tasks not in `order` come last."""
+    """Compute each task's score (paper, section IV.C), in this `order` of tasks. Other tasks come last."""
     judged: Counter[tuple[str, int]] = Counter()
     passed: Counter[tuple[str, int]] = Counter()
     for (task, prompt, has_passed, *_), count in tally.items():
@@ -53,5 +53,5 @@ def scores_of(tally: Tally, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
 
 
 def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
-    """Compute the scores of tasks and prompts in a table. Tasks not in `order` come last."""
+    """Compute the score of each task in a table, in this `order` of tasks. Other tasks come last."""
     return scores_of(tally_of(table), order)

@@ -18,7 +18,7 @@ from roboeval.suites.load import Suite
 
 @dataclass(frozen=True)
 class Failures:
-    """The number and share of failures of a class, or of a kind within a class."""
+    """The number of failures of a class or of a kind, and their share of all judged completions."""
 
     name: str
     count: int
@@ -57,10 +57,10 @@ class EvaluationSummary:
 def summarise(
     tally: Tally, suite: Suite, scope: JudgingScope, *, k: Sequence[int] = (1,), ablated: bool = False
 ) -> EvaluationSummary:
-    """Summarise an evaluation. Raise UserError if nothing was judged or if k is too large for a prompt."""
+    """Summarise an evaluation with pass@k for each k. Raise UserError if none is judged or k is too large."""
     tasks = scores_of(tally, suite.tasks)
     if not tasks:
-        raise UserError(f"0 of {how_many(scope.total)} judged; `roboeval evaluate` judges them")
+        raise UserError(f"0 of {how_many(scope.total)} are judged; run `roboeval evaluate`")
     try:
         estimates = tuple(overall(tasks, tries) for tries in k)
     except ValueError as error:
@@ -116,7 +116,7 @@ def causes(tally: Tally) -> Causes:
 
 
 def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
-    """Return the kinds of failure of a class (`name`) that occur in any of `found`, known kinds first."""
+    """Return the kinds of failure of class `name` that occur in any of `found`. Known kinds come first."""
     occurring = {kind for one in found for kind in one.kinds.get(name, {})}
     known = [kind for kind in FAILURE_CLASSES[name].kinds if kind in occurring]
     return [*known, *sorted(occurring - {*known})]

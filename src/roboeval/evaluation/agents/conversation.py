@@ -24,14 +24,14 @@ MAX_REASONING = 200_000
 
 @dataclass(frozen=True)
 class TurnLimits:
-    """The numbers of replies and tokens after which a mission ends."""
+    """The limits of an agent's mission: the number of replies (turns), and of tokens (None: no limit)."""
 
     turns: int  # the number of replies
     tokens: int | None = None  # of all turns, as far as the model counts them
 
 
 class Conversation(ABC):
-    """A mission as a conversation: send `prompt`, `add` the reply, and repeat until `prompt` is None."""
+    """A mission as a conversation with a model: send `prompt`, `add` the reply, until `prompt` is None."""
 
     def __init__(self, mission: AgentMission, prompt: Prompt, limits: TurnLimits) -> None:
         self.mission, self.limits = mission, limits
@@ -49,7 +49,7 @@ class Conversation(ABC):
             self.end(reply.no_program)
 
     def end(self, ending: str, why: str = "") -> None:
-        """End the mission with one of `ENDINGS`, such as `Rejected`, and note `why` in its program."""
+        """End the mission with one of `ENDINGS`, such as `Rejected`. The program gets `why` as a comment."""
         self.prompt = None
         self.mission.end(ending, why)
 
@@ -59,7 +59,7 @@ class Conversation(ABC):
 
     @property
     def limit(self) -> str | None:
-        """`TurnLimit` or `TokenLimit` if the mission has reached this limit, or else None."""
+        """The limit that the mission has reached, `TurnLimit` or `TokenLimit`, or else None."""
         if len(self.replies) >= self.limits.turns:
             return TURN_LIMIT
         used = sum(reply.usage.total for reply in self.replies)
@@ -102,7 +102,7 @@ class AgentConversation(Conversation):
 
 
 def mission_data(mission: AgentMission) -> dict[str, Any]:
-    """Return a mission's calls as `program`, its `ending`, and `tool_errors`: mistakes counted by kind."""
+    """Return a mission's `program`, its `ending`, and `tool_errors`, the number of mistakes of each kind."""
     return {
         "program": mission.program,
         "ending": mission.ending,
@@ -119,7 +119,7 @@ def _total_usage(usages: list[Mapping[str, int | None]]) -> dict[str, int | None
 
 
 class ReplanConversation(Conversation):
-    """Runs a model's programs one after the other, until one of them ends without an error."""
+    """Runs a model's program and, after each error, asks for another program for the rest of the mission."""
 
     def __init__(self, mission: AgentMission, prompt: Prompt, limits: TurnLimits) -> None:
         super().__init__(mission, prompt, limits)

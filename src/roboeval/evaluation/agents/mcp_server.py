@@ -60,7 +60,7 @@ class MissionDesk:
         ]
 
     def call(self, name: str, arguments: dict[str, Any]) -> str:
-        """Call a tool of `tools` for the client, and return the result as text."""
+        """Call one of the `tools` for the client. Return the result, or what the call got wrong, as text."""
         if self._current is None:
             return self._begin() if name == NEXT else f"There is no mission; call {NEXT}."
         key, mission = self._current
@@ -108,7 +108,7 @@ class MissionDesk:
 
 @contextlib.contextmanager
 def open_desk(run: RunFolder, plan: AgentPlan, model: str) -> Iterator[MissionDesk]:
-    """Open a run for an MCP client, and yield a desk with its unfinished missions. Rows name the `model`."""
+    """Lock a run, and yield a desk with its unfinished missions. Saved rows name the client's `model`."""
     with run.writing():
         about, _, todo = begin_batch(run, plan, model, UNKNOWN_SETTINGS)
         write_whole(run.about, to_text(about))
@@ -117,7 +117,7 @@ def open_desk(run: RunFolder, plan: AgentPlan, model: str) -> Iterator[MissionDe
 
 
 async def serve_agent(desk: MissionDesk) -> None:
-    """Serve one client on standard input and output until it closes them, or a signal arrives."""
+    """Serve one MCP client on standard input and output, until the client leaves or a signal arrives."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, _end, desk, number)
 

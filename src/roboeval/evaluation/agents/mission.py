@@ -69,9 +69,9 @@ class AgentMission:
         self._ledger = Ledger(self.robot)
 
     def call(self, name: str, arguments: str | Mapping[str, object]) -> str:
-        """Call a skill, `wait` or `give_up`, and return the result as text. This may end the mission."""
+        """Call a skill, `wait` or `give_up`. Return the result or error as text. This may end the mission."""
         if self.ending is not None:
-            raise UserError("this mission is over; begin another one")
+            raise UserError("this mission is over, so no call is possible; begin another mission")
         try:
             given = _read(arguments)
             if name in self.suite.skills:
@@ -93,7 +93,7 @@ class AgentMission:
         return text
 
     def refuse(self, kind: str, sentence: str, what: str) -> str:
-        """Count a mistake, note `what` in the program, and return a message. Three in a row end a mission."""
+        """Count a mistake, add `what` as a comment, and return a message. Three in a row end the mission."""
         self.mistakes[kind] += 1
         self._in_a_row += 1
         self._note(f"{kind}: {what}")
@@ -110,19 +110,19 @@ class AgentMission:
         )
 
     def answer(self, text: str) -> None:
-        """End the mission, since the agent says that it is done, and note the text in the program."""
+        """End the mission, because the agent says that it is done. Add `text` to the program as a comment."""
         self.ending = FINAL_ANSWER if self.robot.skill_calls else NO_CALL
         if text:
             self._note(f"In the end: {text}")
 
     def end(self, ending: str, why: str = "") -> None:
-        """End the mission with one of `ENDINGS`, such as `TurnLimit`, and note `why` in the program."""
+        """End the mission with one of `ENDINGS`, such as `TurnLimit`. The program gets `why` as a comment."""
         self.ending = ending
         if why:
             self._note(f"{ending}: {why}")
 
     def give_up(self, reason: str) -> str:
-        """End the mission and return a message. The ending is `GaveUp`, or `error` after a failed call."""
+        """End the mission. Return a message. The ending is `GaveUp`, or `error` if the last call failed."""
         at, lines = self.robot.try_at, self.robot.lines
         self.ending = GAVE_UP if at is None else ERROR
         if at is not None:
@@ -133,7 +133,7 @@ class AgentMission:
 
     @property
     def program(self) -> str:
-        """The source of a program that makes the calls so far, and does the same in this world."""
+        """The source of a program that repeats the calls so far, with the same effect in this world."""
         lines = self.robot.lines
         needs_time = any("time.sleep(" in line for line in lines)
         is_empty = all(line.startswith("#") for line in lines)
@@ -142,7 +142,7 @@ class AgentMission:
 
     @property
     def outcome(self) -> Outcome:
-        """The outcome of the calls so far, as if a program had made them; it decides the verdict."""
+        """The outcome by which the mission is judged, as if a program had made the calls so far."""
         kind = "robot-error" if self.ending == ERROR else "finished"
         end = {"end": kind, "number": len(self._ledger.errors) - 1}
         outcome = judge_end(self._ledger.outcome_at_end(end), self.robot)
@@ -195,7 +195,7 @@ def _read(arguments: str | Mapping[str, object]) -> Mapping[str, Any]:
     except (ValueError, RecursionError):
         given = arguments
     if not isinstance(given, Mapping | None):
-        raise UserError("the arguments are not a JSON object")
+        raise UserError('the arguments are not a JSON object; send {"NAME": VALUE, ...}')
     return given or {}
 
 

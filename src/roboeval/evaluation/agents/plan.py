@@ -29,11 +29,11 @@ DEFAULT_TURNS: dict[AgentMode, int] = {"agent": 300, "replan": 4}  # some worlds
 
 @dataclass(frozen=True, kw_only=True)
 class AgentPlan(GenerationPlan):
-    """Plans missions: for each prompt, `num_completions` of them in each world of its task.
+    """Plans an agent's missions: `num_completions` for each prompt in each world of its task.
 
     Args:
         mode: `agent` if the model calls skills, or `replan` if it writes a program and, after each failure,
-            another one for the rest.
+            another program for the rest of the mission.
         limits: the numbers of replies and tokens after which a mission ends.
         contract: a limit on what the robot may do in each mission, or None.
     """
@@ -45,7 +45,7 @@ class AgentPlan(GenerationPlan):
     has_turns: ClassVar[bool] = True
 
     def keys(self) -> list[CompletionKey]:
-        """Return all keys. With 3 worlds, indexes 0 to 2 are the first mission in each, 3 to 5 the second."""
+        """Return all keys. In 3 worlds, indexes 0, 1, 2 are the first missions, and 3, 4, 5 the second."""
         first = GenerationPlan(self.suite, self.tasks, 1)
         prompts = [(task, prompt) for task, prompt, _ in first.keys()]  # noqa: SIM118 - a plan is no mapping
         return [
@@ -70,7 +70,7 @@ class AgentPlan(GenerationPlan):
     async def complete(
         self, key: CompletionKey, model: str, ask: Ask, earlier: Sequence[Reply] = ()
     ) -> dict[str, Any]:
-        """Let the model carry out a mission, after its `earlier` replies if any, and return the row."""
+        """Let the model carry out a mission, or continue it after `earlier` replies, and return its row."""
         conversation = self.begin(key)
         for reply in earlier:
             await asyncio.to_thread(conversation.add, reply)

@@ -27,9 +27,10 @@ class Engine(Protocol):
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
-        """Run each distinct program once, and yield `then(result)` for each work, in order.
+        """Run `function` once for each distinct work, and yield `then(result)` for all works, in order.
 
-        `function` and `then` may run in other processes, so they and their results must be picklable.
+        A work is a task's name and a program. `function` and `then` may run in other processes, so they and
+        their results must be picklable.
         """
 
 
@@ -71,7 +72,7 @@ class Local:
 
 @cache
 def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = False) -> Worker:
-    """Return this process's worker, started only once. Raise EngineError if it lacks required isolation."""
+    """Return this process's worker, started only once. Raise EngineError if it cannot isolate as required."""
     worker = Worker(one_process_per_run=one_process_per_run)
     if require_isolation and not worker.has_seccomp:
         worker.close()

@@ -52,12 +52,12 @@ class Processes:
             try:
                 yield from map_batches(submit, works, workers=self._workers, name=lambda work: digest(*work))
             except BrokenExecutor:
-                raise EngineError("a worker process died, perhaps for lack of memory") from None
+                raise EngineError("a worker process died; use fewer workers if memory is short") from None
 
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Start a process pool that ends with the block, or with this process if this process ends first."""
+    """Yield a pool of processes, which end with the block, or with this process if that ends first."""
     context = get_context("spawn")
     with ExitStack() as held:
         with starting_processes():
@@ -82,7 +82,7 @@ def starting_processes() -> Iterator[None]:
 
 
 def exit_with_parent(pipe: Connection) -> None:
-    """Exit this process as soon as the other end of a pipe is closed."""
+    """Start a thread that exits this process when its parent closes the other end of `pipe`, or dies."""
     gc.set_threshold(GC_THRESHOLD, *gc.get_threshold()[1:])
 
     def end() -> None:
@@ -93,12 +93,12 @@ def exit_with_parent(pipe: Connection) -> None:
 
 
 def run_batch(functions: bytes, isolation: Mapping[str, bool], works: Sequence[Work]) -> list[Any]:
-    """Run and judge programs with this process's worker. `functions` are pickled: `function` and `then`."""
+    """Run and judge programs with this process's worker. `functions`: the pickled ones of `map_distinct`."""
     function, then = load_functions(functions)
     return [then(ran) for ran in function(own_worker(**isolation), works)]
 
 
 @lru_cache(maxsize=1)
 def load_functions(functions: bytes) -> tuple[RunPrograms[Any], Callable[[Any], Any]]:
-    """Unpickle `function` and `then`. They are cached, because they contain a whole suite."""
+    """Unpickle the functions of `map_distinct`, and cache them, because they contain a whole suite."""
     return pickle.loads(functions)  # type: ignore[no-any-return] # noqa: S301 - pickled by our own parent process

@@ -68,10 +68,8 @@ class RayCluster:
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
-        """Run each distinct program once, as `Engine.map_distinct` describes.
-
-        Shards are never cancelled: Ray 2.60 can abort this process if a cancelled shard has just ended.
-        """
+        """Run each distinct program once, as `Engine.map_distinct` describes."""
+        # Never cancel shards: Ray 2.60 can abort this process if a cancelled shard has just ended.
         remote = self._ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=False)(run_shard)
         functions = self._ray.put((function, then))
         distinct = DistinctKeys(works, lambda work: digest(*work))
@@ -138,7 +136,7 @@ def run_shard(
     versions: str,  # a machine with other versions might judge differently
     isolation: Mapping[str, bool],
 ) -> tuple[list[WorkResult], str | None]:
-    """Run programs in a Ray process. Return the results, and a warning or None if isolation is complete."""
+    """Run programs in a Ray process. Return the results, and a warning about isolation (None: complete)."""
     machine = platform.node()
     if versions != VERSIONS:
         raise EngineError(f"{machine} has {VERSIONS}; install {versions} there")

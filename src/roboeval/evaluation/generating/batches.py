@@ -52,7 +52,7 @@ def write_requests(
     with run.writing():
         about, _, todo = begin_batch(run, plan, model.name, model.settings)
         if not todo:
-            raise UserError(f"already has all {how_many(len(plan.keys()))}; none is requested", file=run.path)
+            raise UserError(f"already has all {how_many(len(plan.keys()))}; request more", file=run.path)
         with open_replacement(path) as file:
             for number, key in enumerate(todo, 1):
                 asked = model.request(plan.prompt(key), number=plan.sample(key))
@@ -74,7 +74,7 @@ def request_id(about: Mapping[str, Any], key: CompletionKey, instruction: str) -
 
 @dataclass(frozen=True)
 class ImportResult:
-    """Counts a run's completions after an import of answers."""
+    """The numbers of new, expected and missing completions after an import, and why some are missing."""
 
     new: int  # completions that the import added
     total: int  # completions that the run should have
@@ -131,14 +131,14 @@ def _row(
     reply = model.reply(plan.prompt(key), number=plan.sample(key), status=status, body=body)
     row = row_for(key, plan.instruction(key), model.name, reply.data())
     if (size := len(to_line(row))) > MAX_ROW:
-        raise ModelError(f"the reply is too long to save: {size:,} bytes", is_temporary=False)
+        raise ModelError(f"the reply has {size:,} bytes; the limit is {MAX_ROW:,}", is_temporary=False)
     return row
 
 
 def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:
     about = about_of(run)
     if not batches(about):
-        raise UserError("was not started by `roboeval generate --requests`; use another run", file=run.path)
+        raise UserError("was not started by `roboeval generate --requests`; use one that was", file=run.path)
     if about.get("suite") != suite.name:
         sentence = f'belongs to the suite "{about.get("suite")}"; select that suite with --suite'
         raise UserError(sentence, file=run.path)
@@ -169,7 +169,7 @@ def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> BatchAnswer:
         raise UserError("this line is not an answer from a batch endpoint; choose the file of answers")
     if key is None:
         name = repr(row.get("custom_id"))
-        raise UserError(f"the request {name} is of another run or has other settings; choose its run")
+        raise UserError(f"this run has not made the request {name} with these settings; choose the right run")
     if not isinstance(response, dict):
         return key, 200, error
     status, body = response.get("status_code"), response.get("body")

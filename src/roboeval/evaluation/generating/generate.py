@@ -34,7 +34,7 @@ class Pace:
 
 @dataclass
 class GenerationProgress:
-    """Counts the completions that a run should have and those it has so far."""
+    """Counts the completions that a run should have and those it has, their tokens, and failed requests."""
 
     total: int
     found: int  # completions present at the start
@@ -93,7 +93,7 @@ def generate_run(
 
 
 def reply_of_refusal(error: ModelError) -> Reply:
-    """Return the reply to record for a request that the server refused and would refuse again."""
+    """Return a reply without a program, which records that the server refused a request for its content."""
     return make_reply(error.sentence, Usage(), None, None, known_kind="refusal", has_answer=False)
 
 
@@ -179,8 +179,8 @@ class _Generation:
 
     async def _keep(self, key: CompletionKey, row: dict[str, Any]) -> None:
         line = to_line(row)
-        if len(line) > MAX_ROW:
-            raise ModelError(f"the reply is too long to save: {len(line):,} bytes", is_temporary=True)
+        if (size := len(line)) > MAX_ROW:
+            raise ModelError(f"the reply has {size:,} bytes; the limit is {MAX_ROW:,}", is_temporary=True)
         self.file.append(line)
         if self.turns is None:
             self.log.kept(key)

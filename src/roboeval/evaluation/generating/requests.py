@@ -57,11 +57,11 @@ class GenerationPlan:
         return prompt_for(self.instruction(key), rules=rules, skills=skills)
 
     def sample(self, key: CompletionKey) -> int:
-        """Return the number, from 0, that makes the random seed of a completion's request differ."""
+        """Return a number, from 0, that differs between a prompt's completions, to vary the model's seed."""
         return key[2]
 
     def copied_completions(self) -> Iterable[Completion]:
-        """Return the completions to copy instead of requesting them. A run without rounds has none."""
+        """Return the completions to copy instead of requesting them. Only a `RoundPlan` has any."""
         return ()
 
     def describe(self) -> dict[str, Any]:
@@ -76,7 +76,7 @@ class GenerationPlan:
         return row_for(key, self.instruction(key), model, reply.data())
 
     def completed(self, run: RunFolder) -> Iterator[Completion]:
-        """Read the completions of a run. Raise UserError if an instruction differs from the suite's."""
+        """Read the existing completions. Raise UserError if an instruction differs from the suite's."""
         if not run.completions.is_file() or not run.completions.stat().st_size:
             return
         for completion in read_completions(run.completions, self.suite):
@@ -106,12 +106,12 @@ class RoundPlan(GenerationPlan):
     problems: Mapping[CompletionKey, Sequence[str]] = field(repr=False)
 
     def prompt(self, key: CompletionKey) -> Prompt:
-        """Return the prompt for a completion. For a repair, it includes the rejected program."""
+        """Return the prompt for a completion. A repair's prompt has the rejected program and its problems."""
         first, program = super().prompt(key), self.earlier[key].program
         return first.after(program, self.problems[key]) if self.repairs and program.strip() else first
 
     def sample(self, key: CompletionKey) -> int:
-        """Return the number that makes the random seed differ between completions and between rounds."""
+        """Return a number that differs between completions and between rounds, to vary the model's seed."""
         return key[2] + self.number * SAMPLE_STRIDE
 
     def copied_completions(self) -> Iterator[Completion]:
@@ -119,14 +119,14 @@ class RoundPlan(GenerationPlan):
         return (one for key, one in self.earlier.items() if key not in self.problems)
 
     def folder(self, run: RunFolder) -> RunFolder:
-        """Return the folder of this round, such as `retry-2`. `run` is the folder of round 0."""
+        """Return this round's folder, such as `retry-2` or `repair-1`, in `run`, the folder of round 0."""
         return RunFolder(run.path / f"{'repair' if self.repairs else 'retry'}-{self.number}")
 
 
 def begin_batch(
     run: RunFolder, plan: GenerationPlan, model: str, settings: SamplingSettings
 ) -> tuple[dict[str, Any], set[CompletionKey], list[CompletionKey]]:
-    """Return the new content of run.json, the keys of existing completions, and the keys to request.
+    """Plan requests. Return the new content of run.json, the keys that exist, and the keys to request.
 
     Raises UserError if existing completions have other settings.
     """
@@ -146,7 +146,7 @@ def _run_metadata(
     if run.about.exists():
         earlier = load_json_object(run.about)
         if not isinstance(earlier.get("settings"), dict):
-            raise UserError("has imported completions, so no others fit; name another folder", file=run.path)
+            raise UserError("has imported completions; name another folder for new ones", file=run.path)
         _expect_same(earlier, fixed, run.about)
     elif run.completions.exists() and run.completions.stat().st_size:
         why = "is missing, so the settings of the completions are unknown"
@@ -180,13 +180,13 @@ def _with_batch(
 
 
 def batches(metadata: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the batches of requests that run.json records, in order. `metadata` is its content."""
+    """Return the batches of requests that `metadata`, the content of run.json, records, in order."""
     found = metadata.get("batches")
     return [dict(one) for one in found if isinstance(one, dict)] if isinstance(found, list) else []
 
 
 def requested_tasks(metadata: Mapping[str, Any]) -> frozenset[str] | None:
-    """Return the tasks that run.json says were requested, or None for all."""
+    """Return the tasks that were requested according to `metadata`, the content of run.json; None for all."""
     requested: set[str] = set()
     for batch in batches(metadata):
         if not isinstance(batch.get("tasks"), list):

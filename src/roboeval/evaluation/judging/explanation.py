@@ -29,7 +29,10 @@ EVENT_SIZE = 10  # characters that each event counts for in addition to its text
 
 
 def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dict[str, Any]:
-    """Explain as JSON data why a completion failed: the first failing world, and the error or check there."""
+    """Return as JSON data why a completion failed: its first failing world, and the error or failed check.
+
+    `ablated` says whether it was judged by the requirements of common sense only.
+    """
     why = row["failure"]
     verdict = row["verdicts"][why["world"]]
     ending = {key: verdict[key] for key in ("world", "error", "line")}
@@ -44,7 +47,7 @@ def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dic
 def completion_data(
     row: Mapping[str, Any], completion: Completion, suite: Suite | None, *, ablated: bool = False
 ) -> dict[str, Any]:
-    """Describe a completion as JSON data: instruction, program, and steps and failed checks in each world."""
+    """Return a completion as JSON data: instruction, program, and each world's steps and failed checks."""
     budget = ExplanationBudget()
     return {
         **{key: row[key] for key in (*KEY, "passed", "failure")},
@@ -60,13 +63,13 @@ def completion_data(
 
 
 def suite_instruction(suite: Suite | None, task: str, prompt: int) -> str | None:
-    """Return the suite's own text of a prompt, or None if the suite lacks the prompt."""
+    """Return the instruction of a prompt in a suite, or None if there is no suite or it lacks the prompt."""
     prompts = () if suite is None or task not in suite.tasks else suite.tasks[task].prompts
     return prompts[prompt] if prompt < len(prompts) else None
 
 
 def instruction_shown(recorded: str | None, of_suite: str | None) -> tuple[str | None, str | None]:
-    """Return a note such as "instruction not recorded", and the instruction to show. Each may be None."""
+    """Return a note (None if the instruction was recorded), and the instruction to show (None if unknown)."""
     if recorded is not None or of_suite is None:
         return INSTRUCTION_NOT_RECORDED if recorded is None else None, recorded
     return f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}", of_suite
@@ -84,7 +87,7 @@ class ExplanationBudget:
         self._left = MAX_EXPLAINED_SIZE
 
     def covers(self, trace: Trace) -> bool:
-        """Subtract a trace from the budget, and return whether enough was left to explain a check on it."""
+        """Subtract a trace's size from the budget. Return whether there was enough to explain a check."""
         texts = [text for event in trace for text in (event.text, *(option.text for option in event.options))]
         self._left -= EVENT_SIZE * len(trace) + sum(map(len, texts))
         return self._left >= 0
@@ -130,19 +133,19 @@ def _explained(
 
 
 def error_sentence(verdict: Mapping[str, Any]) -> str:
-    """Return the error that ended a run, such as `line 3: the door is locked`. The line may be unknown."""
+    """Return the error that ended a run, such as `line 3: the door is locked`. Omit an unknown line."""
     where = "" if verdict["line"] is None else f"line {verdict['line']}"
     return ": ".join(filter(None, (where, verdict["error"]["message"])))
 
 
 def first_lines(program: str) -> tuple[str, int]:
-    """Return the first 1,000 lines of a program, with long lines shortened, and the number of other lines."""
+    """Return the first 1,000 lines of a program, with long lines shortened, and how many others there are."""
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MAX_PROGRAM_LINES])
     return shown, max(0, len(lines) - MAX_PROGRAM_LINES)
 
 
 def cut_sentence(cut: Mapping[str, Any]) -> str:
-    """Return a sentence that says how many steps were not saved."""
+    """Return a sentence such as "2 more steps were not saved, because the trace is too long"."""
     were = "was" if cut["events"] == 1 else "were"
     return f"{counted(cut['events'], 'more step')} {were} not saved, because the trace is too long"

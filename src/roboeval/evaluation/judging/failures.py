@@ -85,22 +85,22 @@ FAILURE_CLASSES: Mapping[str, FailureClass] = {
 
 
 def label_of(name: str) -> str:
-    """Return the label of a failure class, such as `failed check`; an unknown `name` unchanged."""
+    """Return the label of a failure class, such as `failed check`, or the `name` itself if it is unknown."""
     return FAILURE_CLASSES[name].label if name in FAILURE_CLASSES else name
 
 
 def plural_of(name: str) -> str:
-    """Return the plural label of a failure class, such as `failed checks`; an unknown `name` unchanged."""
+    """Return the plural label of a failure class, such as `failed checks`, or the `name` if it is unknown."""
     return FAILURE_CLASSES[name].plural if name in FAILURE_CLASSES else name
 
 
 def classes_to_show(happened: Collection[str]) -> list[str]:
-    """Return the failure classes to show: always the paper's three, and others only if they `happened`."""
+    """Return the names of failure classes to show: the paper's three, and others only if they `happened`."""
     return [name for name, one in FAILURE_CLASSES.items() if one.is_always_shown or name in happened]
 
 
 def no_program_sentence(failure: Mapping[str, Any]) -> str | None:
-    """Return a sentence that says why a reply contained no program, or None for another kind of failure."""
+    """Return a sentence that says why a reply contained no program, or None for other classes of failure."""
     if failure["class"] != NO_PROGRAM_CLASS:
         return None
     return next((words for kind, words in NO_PROGRAM_SENTENCES.items() if kind == failure["kind"]), "")
@@ -108,7 +108,7 @@ def no_program_sentence(failure: Mapping[str, Any]) -> str | None:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The judgement on a program in one world."""
+    """The judgement on a program in one world: its outcome there, and the requirements that it fails."""
 
     world: str  # the description of the world
     outcome: Outcome
@@ -126,8 +126,8 @@ class Verdict:
 def failure_of_verdicts(verdicts: Sequence[Verdict]) -> Failure | None:
     """Return the failure of a completion in its first unsatisfied world, or None if it passes.
 
-    The failure is the first failed check in that world, or else the error there. A run that ends in an error
-    has no failed checks, unless it reached a limit in a world where programs may wait forever.
+    The failure is the first failed check in that world, or else the error there. Checks do not count after an
+    error, except after a timeout in a world where programs may wait forever.
     """
     for index, verdict in enumerate(verdicts):
         if not verdict.satisfied:

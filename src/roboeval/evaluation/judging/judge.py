@@ -45,7 +45,7 @@ def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
 
 
 def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
-    """Return whether requirements decide on a run: it finished, or timed out in a world that allows this."""
+    """Return whether a run finished, or timed out where programs may wait forever. Otherwise, it fails."""
     waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
     return waited or outcome.status is Status.FINISHED
 
@@ -61,7 +61,7 @@ def are_met(outcome: Outcome, scenario: Scenario) -> tuple[bool, ...]:
 
 
 def is_met(requirement: Requirement, trace: Trace) -> bool:
-    """Return whether a trace satisfies a requirement. An inconclusive result counts as not satisfied."""
+    """Return whether a trace satisfies a requirement. One that cannot be decided counts as not satisfied."""
     try:
         return holds(requirement.formula, trace)
     except Inconclusive:
@@ -102,7 +102,7 @@ def evaluate(
 def judgements(
     completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
 ) -> Iterator[tuple[Completion, bytes | None]]:
-    """Yield each completion with its judgement as JSON, or warn and yield None if judging takes too long."""
+    """Yield each completion with its judgement as JSON, or with None and a warning if that takes too long."""
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[Work]:
@@ -234,7 +234,10 @@ class ResultCache(Generic[CachedResult]):
         runs: Iterable[Outcome],
         compute: Callable[[], CachedResult],
     ) -> CachedResult:
-        """Return the cached result for `key`, or compute it. `keep_alive` keeps the ids in the key valid."""
+        """Return the cached result for `key`, or compute it. Results of long `runs` are not cached.
+
+        `keep_alive` holds the objects whose ids `key` contains, so that no other objects can get these ids.
+        """
         known = self._known.get(key)  # another thread may clear the cache at any moment
         if known is not None:
             return known[0]

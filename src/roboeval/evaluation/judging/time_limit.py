@@ -18,7 +18,7 @@ class TimeLimitExceeded(Exception):  # noqa: N818 - a signal, not an error
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise TimeLimitExceeded in the block after `seconds` of processor time, if this is the main thread."""
+    """Raise TimeLimitExceeded after `seconds` of processor time in the block, but only in the main thread."""
     if threading.current_thread() is not threading.main_thread():  # only the main thread receives signals
         yield
         return

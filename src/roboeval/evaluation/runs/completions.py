@@ -43,7 +43,7 @@ class Completion:
         task: the task's name.
         prompt: the number of the phrasing, from 0, below a billion.
         index: the number of the sample, from 0, below a billion.
-        program: the cleaned source text, which is judged unchanged.
+        program: the source text without the rest of the reply; it is judged exactly as it is.
         instruction: the instruction in the prompt, or None if it was not recorded.
         model: the name of the model, or None if it was not recorded.
         more: other entries of the row, such as `usage`, `raw_reply` and `finish_reason`.
@@ -71,7 +71,7 @@ class Completion:
             if not isinstance(text, str) and (text is not None or name in REQUIRED):
                 raise UserError(f"the {name} is {text!r}, but it must be a string")
         if "world" in self.more and self.mission is None:
-            raise UserError(f'a mission needs a "world" from 0 and an "ending": {", ".join(ENDINGS)}')
+            raise UserError(f'a mission needs a "world" from 0 and as "ending" one of {", ".join(ENDINGS)}')
         if (kind := self.more.get(NO_PROGRAM_COLUMN)) not in (None, *NO_PROGRAM_KINDS):
             raise UserError(
                 f'"{NO_PROGRAM_COLUMN}" is {kind!r}; use null or one of {", ".join(NO_PROGRAM_KINDS)}'
@@ -145,7 +145,7 @@ class Completion:
 
     @property
     def program_sha256(self) -> str:
-        """Return the SHA-256 of the program, including lone surrogates, in hexadecimal."""
+        """Return the hexadecimal SHA-256 of the program in UTF-8 (with `errors="surrogatepass"`)."""
         return hashlib.sha256(self.program.encode(errors="surrogatepass")).hexdigest()
 
 
@@ -215,7 +215,7 @@ def _expect_new(key: CompletionKey, seen: dict[CompletionKey, int], number: int)
 
 
 def check_length(row: Mapping[str, Any], file: str | None) -> None:
-    """Raise UserError, about this `file` if it is known, if a row is too long to be copied into a run."""
+    """Raise UserError if a row is too long to be copied into a run. The error names `file`, unless None."""
     if len(to_line(row)) > MAX_ROW:
         raise UserError(f"this row is longer than {MAX_ROW:,} bytes; shorten the program", file=file)
 

@@ -37,10 +37,10 @@ _NORMAL = {FINAL_ANSWER, ERROR, NO_CALL}
 
 
 def apply_ending(outcome: Outcome, ending: str) -> Outcome:
-    """Return the outcome of an agent's mission, from the outcome of a program with the same calls.
+    """Return the outcome of an agent's mission, given the outcome of a program with the same calls.
 
-    If that program finished, the mission fails with a timeout if its ending is a limit, or with an error of
-    the agent if its ending is a mistake, such as giving up. Otherwise, the outcome is unchanged.
+    Only the outcome of a finished program may change: to a timeout if the ending is a limit, or to an error
+    of the agent if the ending is a mistake, such as giving up.
     """
     if ending in _NORMAL or outcome.status is not Status.FINISHED:
         return outcome

@@ -39,7 +39,7 @@ class RunFolder:
 
     @property
     def in_flight(self) -> Path:
-        """Return the path of the log of pending requests."""
+        """Return the path of inflight.jsonl, the log of pending requests."""
         return self.path / "inflight.jsonl"
 
     @property
@@ -48,7 +48,7 @@ class RunFolder:
         return self.path / "turns.jsonl"
 
     def rows(self, key: str) -> Path:
-        """Return the path of an evaluation's rows, given its `evaluation_key`."""
+        """Return the path of KEY.jsonl, the rows of an evaluation. `key` is its `evaluation_key`."""
         return self.path / "evaluations" / f"{key}.jsonl"
 
     def manifest(self, key: str) -> Path:
@@ -56,7 +56,7 @@ class RunFolder:
         return self.path / "evaluations" / f"{key}.json"
 
     def checks(self, key: str) -> Path:
-        """Return the path of the file with the problems that the check found in each program."""
+        """Return the path of the file that lists the problems found by the program check in each program."""
         return self.path / "checks" / f"{key}.jsonl"
 
     def questions(self, key: str) -> Path:
@@ -178,7 +178,7 @@ def load_json_object(path: Path) -> dict[str, Any]:
 
 
 def selected_tasks(manifest: Mapping[str, Any]) -> frozenset[str] | None:
-    """Return the tasks that KEY.json says were selected for the evaluation, or None for all."""
+    """Return the tasks selected for an evaluation according to `manifest`, its KEY.json; None means all."""
     tasks = manifest.get("tasks")
     return None if tasks is None else frozenset(tasks)
 
@@ -198,7 +198,7 @@ def evaluation_key(suite: Suite, *, ablated: bool) -> str:
 def tasks_to_judge(
     suite: Suite, names: str | None, *, ablated: bool
 ) -> tuple[frozenset[str] | None, tuple[str, ...]]:
-    """Parse names such as `A, B`. Return the tasks to judge (None: all) and those without an ablation."""
+    """Parse task names such as `A, B`. Return those to judge (None: all) and those without an ablation."""
     wanted = [*suite.tasks] if names is None else [suite.task(name.strip()).name for name in names.split(",")]
     if not ablated:
         return (None if names is None else frozenset(wanted)), ()
@@ -210,7 +210,7 @@ def tasks_to_judge(
 
 
 def with_judged_worlds(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
-    """Return the suite with the worlds (number and seed) in which the run was judged, as KEY.json records."""
+    """Return the suite with the number and seed of worlds that KEY.json records, if the run was judged."""
     path = run.manifest(evaluation_key(suite, ablated=ablated))
     drawn = suite.worlds, suite.seed
     if suite.worlds is None or not path.is_file():

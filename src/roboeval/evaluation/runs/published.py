@@ -82,7 +82,7 @@ def _files(path: Path) -> Iterator[Iterator[File]]:
     try:
         archive = zipfile.ZipFile(path)
     except UNREADABLE_ZIP as error:
-        raise UserError(f"is not a readable zip ({error})", file=path) from None
+        raise UserError(f"is not a readable zip ({error}); create it again", file=path) from None
     with archive:
         yield _members(path, archive)
 
@@ -100,7 +100,7 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
             with archive.open(member) as file:
                 data = file.read(MAX_ROW + 1)
         except UNREADABLE_ZIP as error:
-            raise UserError(f"is not a readable zip ({error})", file=path) from None
+            raise UserError(f"is not a readable zip ({error}); create it again", file=path) from None
         unpacked += len(data)
         if unpacked > MAX_UNPACKED:
             raise UserError(f"unpacks to more than {MAX_UNPACKED:,} bytes; split the zip", file=path)
@@ -129,7 +129,7 @@ def _assigned(text: str, name: str) -> dict[str, str]:
         if isinstance(target, ast.Name) and target.id in ("prompt", "completion")
     }
     if "completion" not in texts:
-        raise UserError("does not assign a string to `completion`; add this line", file=name)
+        raise UserError('does not assign a string to `completion`; add `completion = "..."`', file=name)
     return texts
 
 

@@ -66,7 +66,7 @@ def load_results(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Results:
-    """One evaluation of a run, with its table of verdicts."""
+    """One evaluation of a run: its completions, its table of verdicts, and what run.json and KEY.json say."""
 
     run: RunFolder
     key: str | None  # the name of the evaluation, such as `plus`; None if the run has not been judged
@@ -104,7 +104,7 @@ class Results:
 
     @cached_property
     def scope(self) -> JudgingScope:
-        """The numbers of the completions that the evaluation should judge, by task and by how they ended."""
+        """The numbers of completions that should be judged, by task and by how they ended."""
         return JudgingScope.of(self.completions.values(), self.tasks, self.about, self.suite)
 
     @property
@@ -158,7 +158,7 @@ def read_results(
         suite: the suite that judged the run, or None if it is not available.
         task: the only task whose rows are read, by default all tasks.
         reuse_from: another evaluation of the same run whose completions can be reused.
-        progress: a function that passes rows through and shows progress.
+        progress: a function that gets the rows and their number, shows progress, and yields the rows.
     """
     if reuse_from:
         about, completions = reuse_from.about, reuse_from.completions

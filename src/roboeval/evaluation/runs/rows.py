@@ -31,7 +31,7 @@ Failure = TypedDict("Failure", {"class": str, "kind": str, "world": int, "check"
 
 
 class RunErrorData(TypedDict):
-    """The error that ended a run."""
+    """The error that ended a run: its kind, such as `NameError`, and its message."""
 
     kind: str
     message: str
@@ -127,7 +127,7 @@ def _expect_consistent(row: Row, data: object) -> None:
         raise ValueError("the row has unknown entries")
     failure = row["failure"]
     if row["passed"] != (failure is None):
-        raise ValueError("a failure must be present if and only if the completion does not pass")
+        raise ValueError("`failure` must be null if and only if the completion passes")
     if failure is not None and not 0 <= failure["world"] < len(row["verdicts"]):
         raise ValueError("the world of the failure does not exist")
     for verdict in row["verdicts"]:
@@ -135,13 +135,13 @@ def _expect_consistent(row: Row, data: object) -> None:
 
 
 def event_count(verdict: WorldVerdict) -> int:
-    """Return the number of events that a trace had when it was judged, before any cut."""
+    """Return the number of events of the whole trace, including those that did not fit into the row."""
     return len(verdict["trace"]) + (verdict["cut"]["events"] if "cut" in verdict else 0)
 
 
 @dataclass(frozen=True)
 class LocatedRow:
-    """A row with its position in the file."""
+    """A row of an evaluation, with its line number, its offset and its size in the file."""
 
     number: int  # the line number, from 1
     at: int  # the offset in the file, in bytes
@@ -168,10 +168,10 @@ def read_lines_of(
         except UserError as error:
             if not line.endswith(b"\n"):
                 break
-            raise UserError(f"{error.sentence}; --redo starts over", file=path, line=number) from None
+            raise UserError(f"{error.sentence}; use --redo to judge again", file=path, line=number) from None
         at += len(line)
     if seal.is_broken(manifest):
-        raise UserError(f"{BROKEN}; --redo starts over", file=path)
+        raise UserError(f"{BROKEN}; use --redo to judge again", file=path)
 
 
 def take_judged(left: dict[CompletionKey, Completion], line: LocatedRow, file: Path) -> Completion:
@@ -186,11 +186,11 @@ def take_judged(left: dict[CompletionKey, Completion], line: LocatedRow, file: P
     sentence = f"this row judges {name_of(key)}, which the run lacks or an earlier row judges"
     if completion is not None:
         sentence = f"the program of {name_of(key)} has changed since it was judged"
-    raise UserError(f"{sentence}; --redo starts over", file=file, line=line.number)
+    raise UserError(f"{sentence}; use --redo to judge again", file=file, line=line.number)
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
-    """Yield the task and hash of each checked program, with its problems in sentences, if there are any."""
+    """Yield the task and hash of each checked program, with its problems as sentences (none: accepted)."""
     for number, row in read_rows(path):
         match row:
             case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
@@ -211,7 +211,7 @@ class Seal:
         self._hash.update(line)
 
     def data(self) -> dict[str, Any]:
-        """Return the seal as entries of KEY.json."""
+        """Return the entries of KEY.json for the seal: `rows` (their number) and `sha256`."""
         return {"rows": self._count, "sha256": self._hash.hexdigest()}
 
     def is_broken(self, manifest: Mapping[str, Any]) -> bool:

@@ -60,7 +60,7 @@ class JudgingScope:
         about: Mapping[str, Any] = {},
         suite: Suite | None = None,
     ) -> JudgingScope:
-        """Count completions. Models, cut-off replies and missions count only for `tasks`; None means all."""
+        """Count completions by task, and models, missions and cut-off replies only of `tasks` (None: all)."""
         every = list(completions)
         selected = [one for one in every if tasks is None or one.task in tasks]
         missions = [(one.mission.ending, one.turns) for one in selected if one.mission is not None]
@@ -97,7 +97,7 @@ class JudgingScope:
 
     @property
     def cut_off_warning(self) -> str | None:
-        """Return a warning with advice if many replies ended at the token limit, or else None."""
+        """Return a warning if more than 2% of the replies ended at the token limit, or else None."""
         share = self.cut_off / self.total if self.total else 0.0
         if share <= MAX_CUT_OFF_SHARE:
             return None

@@ -67,10 +67,7 @@ def recorded_model_for(name: str, suite: Suite) -> RecordedModel:
 
 
 def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
-    """Yield all replies of a recorded model to the prompts of a suite.
-
-    Raises UserError if the model does not exist or has no reply to any prompt.
-    """
+    """Yield a recorded model's replies to a suite's prompts. Raise UserError if there are none."""
     model = recorded_model_for(name, suite)
     found = False
     for task in suite.tasks.values():

@@ -96,7 +96,7 @@ def keys_where(table: pl.DataFrame, condition: pl.Expr) -> list[CompletionKey]:
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
-    """Return the table with `accepted` filled in: whether `problems`, by task and program hash, is empty."""
+    """Return the table with `accepted` filled in: whether `problems[task, hash]` is empty (null: missing)."""
     names = ["task", "program_sha256"]
     answers = [(*key, not found) for key, found in problems.items()]
     accepted = pl.DataFrame(
@@ -107,10 +107,7 @@ def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequenc
 
 
 class TableBuilder:
-    """Builds the table of `load_results` from the rows of an evaluation.
-
-    `categories` maps each pair of a task and a requirement's text to the requirement's category.
-    """
+    """Builds the table of `load_results` from rows. `categories` maps (task, requirement) to its category."""
 
     def __init__(self, categories: Mapping[tuple[str, str], str] = {}) -> None:
         self._categories = categories
