@@ -99,7 +99,7 @@ def verdict_data(verdict: Verdict) -> dict[str, Any]:
 
 
 def limit_size(judgement: Mapping[str, Any]) -> bytes:
-    """Return a judgement as JSON. If it is too long for a row, cut traces, so that worlds share it equally."""
+    """Return a judgement as JSON. If it is too long for a row, cut traces so that worlds share it equally."""
     whole = _json(judgement)
     verdicts = judgement["verdicts"]
     most = max(ROW_BYTES, WORLD_BYTES * len(verdicts)) - ROW_HEADER_BYTES
