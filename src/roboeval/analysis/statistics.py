@@ -57,7 +57,7 @@ def by_bootstrap(
 
 
 def p_by_signs(clusters: Clusters, *, seed: int = BOOTSTRAP_SEED, draws: int = 100_000) -> float:
-    """Return the p-value of a two-sided permutation test that flips the signs of whole clusters.
+    """Return the p-value of a two-sided permutation test that flips the signs of all values of a cluster.
 
     The test is exact for up to 20 clusters. For more, `draws` flips are sampled. With G clusters, p is at
     least 2 / 2**G, so a difference between few clusters cannot be significant.

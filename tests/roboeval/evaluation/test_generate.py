@@ -325,7 +325,7 @@ def test_a_model_that_always_fails_stops_a_run_without_files(
 
 
 def test_a_reply_that_is_too_long_is_a_failure(tmp_path: Path, paper: Suite) -> None:
-    with pytest.raises(ModelError, match=r"too long .* 6,0\d\d,\d\d\d bytes"):
+    with pytest.raises(ModelError, match=r"has 6,0\d\d,\d\d\d bytes; the limit is"):
         generate(RunFolder(tmp_path / "run"), paper, Scripted(text="#" * 3_000_000), pace=Pace(1))
 
 

@@ -96,7 +96,7 @@ PASSED, ALL = "passed", "all"
 
 @dataclass(frozen=True)
 class Causes:
-    """The shares of completions in each class of outcome, and of failures of each kind within a class."""
+    """Shares of completions by outcome (passed or a failure class), and of each class's failures by kind."""
 
     classes: Mapping[str, float]  # shares of all completions, including PASSED
     kinds: Mapping[str, Mapping[str, float]]  # shares of the failures in a class

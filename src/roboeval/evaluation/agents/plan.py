@@ -88,25 +88,25 @@ class AgentPlan(GenerationPlan):
         return row_for(key, self.instruction(key), model, where | conversation.data())
 
     def begin(self, key: CompletionKey) -> Conversation:
-        """Return a new conversation in which the model carries out the mission of a key."""
+        """Return a new conversation for the mission `key` (task, prompt and index of the completion)."""
         kind = AgentConversation if self.mode == "agent" else ReplanConversation
         return kind(self.begin_mission(key), self.prompt(key), self.limits)
 
     def begin_mission(self, key: CompletionKey) -> AgentMission:
-        """Return a new mission in the world of a key, judged by the requirements of its prompt."""
+        """Return the new mission `key`, in its world and with the requirements of its prompt."""
         contracts = () if self.contract is None else (self.contract,)
         scenario = self.suite.tasks[key[0]].scenarios[self.world(key)].asked_by(key[1])
         return AgentMission(self.suite, scenario, contracts)
 
     def prompt(self, key: CompletionKey) -> Prompt:
-        """Return the prompt with which the mission of a key begins."""
+        """Return the model prompt with which the mission `key` begins."""
         if self.mode == "replan":
             return super().prompt(key)
         rules, skills = self.suite.house_sentences, self.suite.skills
         return agent_prompt(self.instruction(key), rules=rules, skills=skills)
 
     def world(self, key: CompletionKey) -> int:
-        """Return the index of the world in which the mission of a key takes place."""
+        """Return the index, in the task, of the world in which the mission `key` takes place."""
         return key[2] % self._worlds(key[0])
 
     def _worlds(self, task: str) -> int:

@@ -76,7 +76,7 @@ def starting_processes() -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise EngineError(f"cannot start a worker process: {error.strerror}") from None
+        raise EngineError(f"cannot start a worker process ({error.strerror}); use fewer workers") from None
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 

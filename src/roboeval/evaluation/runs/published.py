@@ -69,7 +69,7 @@ def _by_key(files: Iterator[File], path: Path) -> dict[CompletionKey, File]:
             )
         by_key[key] = file
     if not by_key:
-        raise UserError(f"contains no file named {NAMED}", file=path)
+        raise UserError(f"contains no file named {NAMED}; choose a folder or zip that does", file=path)
     return by_key
 
 

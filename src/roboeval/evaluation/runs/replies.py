@@ -45,7 +45,7 @@ def reply_numbers(completion: Completion) -> dict[str, float | None]:
 
 
 def reply_facts(reply: Mapping[str, Any]) -> list[str]:
-    """Describe a reply in short texts, such as `tokens: 900 in the prompt, 60 in the reply` and `2.1 s`."""
+    """Describe `reply`, from `reply_data`, in short texts such as `tokens: 60 in the reply` and `2.1 s`."""
     named = zip(TOKENS, ("in the prompt", "in the reply", "in its reasoning"), strict=True)
     tokens = [f"{reply[name]:,} {of}" for name, of in named if reply[name] is not None]
     facts = []

@@ -20,7 +20,7 @@ def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
       number of events.
     - `holding`: `[number, thing]`, what the robot holds from that event on, or an empty text for nothing; at
       the start, it holds nothing.
-    - `to`: `[number, person]`, whom events of this kind ask from that event on, or null for nobody.
+    - `to`: `[number, person]`, whom events of the same kind ask from that event on, or null for nobody.
     - `destinations`: `[number, room]`, the goal of a drive if it differs from the place of the next event, or
       null if the drive failed.
     """
