@@ -169,7 +169,7 @@ def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> BatchAnswer:
         raise UserError("this line is not an answer from a batch endpoint; choose the file of answers")
     if key is None:
         name = repr(row.get("custom_id"))
-        raise UserError(f"this run has not made the request {name} with these settings; choose the right run")
+        raise UserError(f"the request {name} was made by another run or with other settings; choose its run")
     if not isinstance(response, dict):
         return key, 200, error
     status, body = response.get("status_code"), response.get("body")
