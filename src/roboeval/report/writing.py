@@ -53,7 +53,7 @@ def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
 
 
 def sections(runs: Sequence[JudgedRun], *, with_published: bool = False, command: str = "") -> list[Section]:
-    """Return a report's non-empty sections. `with_published` adds the paper's causes. One shows `command`."""
+    """Return a report's non-empty sections, optionally with published causes. The last shows `command`."""
     found = [
         glance_section(runs),
         scores.results_section(runs),

@@ -100,7 +100,7 @@ class AcceptedFinding(StrictForm):
 class ScenarioFile(WorldFile):
     """A world in a task file, with its requirements.
 
-    For common sense only, `ablation` replaces `require`, and `ablation_people` replaces `people`.
+    To judge common sense only, `ablation` replaces `require`, and `ablation_people` replaces `people`.
     """
 
     about: Name

@@ -49,7 +49,7 @@ class HouseRules:
     def read(
         cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (), *, of_suite: bool = False
     ) -> HouseRules:
-        """Read a file of house rules. Raise UserError if one is not valid or names a room outside `rooms`."""
+        """Read a file of house rules. Raise UserError if a rule is wrong or names a room not in `rooms`."""
         rules = read_rules(path, skills, rooms)
         if not of_suite and not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
             mend = "use lower-case letters, digits and dashes"

@@ -42,7 +42,7 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A world with its requirements."""
+    """A world and the requirements that a program must satisfy in it."""
 
     world: World
     require: tuple[Requirement, ...]

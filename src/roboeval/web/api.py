@@ -45,7 +45,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
 
     @api.get("/{run}")
     def show_run(run: str, evaluation: EvaluationQuery = None) -> Response:
-        """Return one run with pass rates of all prompts and all kinds of failure."""
+        """Return one run, with the pass rate of each prompt and the number of failures of each kind."""
         return _json(run_details(store.open(run, evaluation)))
 
     @api.get("/{run}/report")

@@ -61,7 +61,7 @@ def verb_of(chosen: CompletionFilter) -> str:
 
 
 class TaskCells:
-    """Computes the cells of a run in a heat map of tasks by prompts, and marks the selected cell."""
+    """Computes a run's cells in a heat map of tasks (rows) by prompts (columns). Marks the selected cell."""
 
     def __init__(self, run: Snapshot, chosen: CompletionFilter, evaluation: str | None = None) -> None:
         self._run, self._filter, self._evaluation = run, chosen, evaluation
@@ -80,7 +80,7 @@ class TaskCells:
         return [{"name": "mean", "title": "mean over the prompts"}, *numbers]
 
     def row(self, task: str) -> list[dict[str, Any]]:
-        """Return the cells of a task: its mean, and one for each prompt."""
+        """Return the cells of a task: its mean and one for each prompt, or one cell without completions."""
         prompts = self.tasks.get(task)
         if prompts is None:
             return [{**EMPTY_CELL, "text": "no completions", "span": 1 + self._prompts}]

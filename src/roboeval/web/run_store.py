@@ -43,7 +43,7 @@ class RunStore:
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """Return a run's latest snapshot. `key` names an evaluation, by default one that is no ablation."""
+        """Return a run's latest snapshot. `key` names an evaluation, by default no ablation if possible."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:

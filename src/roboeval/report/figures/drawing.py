@@ -55,7 +55,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def render(figure: Figure) -> dict[str, bytes]:
-    """Return a figure's files by ending (`png`, `pdf`, `svg`). Equal figures give equal files."""
+    """Return a figure as bytes by file ending (`png`, `pdf`, `svg`). Equal figures give equal bytes."""
     if (layout := figure.get_layout_engine()) is not None:
         layout.execute(figure)
         figure.set_layout_engine(None)

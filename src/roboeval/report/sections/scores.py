@@ -78,7 +78,7 @@ def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
 
 
 def thresholds_section(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on how many prompts reach a pass@1 of at least x, for each x (paper, section V.A)."""
+    """Build the section on how many prompts have a pass@1 of at least x, for each x (paper, section V.A)."""
     drawn, left_out = runs_to_draw(runs)
     figure = ReportFigure("thresholds", lambda: draw_thresholds(drawn), left_out)
     return section("thresholds", figure, curve_sheet(runs))
