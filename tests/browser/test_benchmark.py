@@ -347,7 +347,7 @@ def test_unknown_addresses_are_reported(real_server: PageServer, open_page: Open
     for path, sentence in (
         ("runs/none", 'this folder has no run "none"; it may have been deleted'),
         ("runs/hasty/LunchBreak/0/99", 'this run has no completion "LunchBreak/0/99"'),
-        ("runs/hasty?evaluation=none", '"hasty" has no evaluation "none"'),
+        ("runs/hasty?evaluation=none", 'the run "hasty" has no evaluation "none"'),
     ):
         page = open_page(real_server, expecting="404")
         page.goto(f"{real_server.inside}/{path}")

@@ -21,7 +21,7 @@ Selection: TypeAlias = tuple[str, *tuple[int, ...]]
 
 
 def load_suite_option(suite: str, rules: Path | None = None, skills: Sequence[Path] | None = None) -> Suite:
-    """Read a suite by name or folder, with a file of house rules and files of more skills, if given."""
+    """Read a suite by its name or folder, and add the house rules and the skills in the given files."""
     from codebotler.checking.house_rules.rooms import find_evasions
     from codebotler.core.skills.files import skills_from
     from codebotler.core.skills.paper import SKILLS
@@ -52,7 +52,7 @@ def parse_selection(text: str, suite: Suite) -> Selection:
 
 
 def expect_judged(selection: Selection, judged: Iterable[CompletionKey]) -> None:
-    """Raise UserError if no completion in this part of a run was judged."""
+    """Raise UserError if none of the `judged` completions is in the selected part of the run."""
     if not any(key[: len(selection)] == selection for key in judged):
         part = "/".join(map(str, selection))
         raise UserError(f"no completion of {part} is judged in this run; `roboeval show RUN` lists its tasks")
@@ -75,14 +75,14 @@ def command(
 
 
 def expect_same_suite(opened: Sequence[Results], suite: str) -> None:
-    """Raise UserError if runs were judged by suites with different content."""
+    """Raise UserError if the runs were judged by different versions of a suite, given by name or folder."""
     digests = [one.manifest.get("digest") for one in opened]
     if len({*digests}) > 1:
         now = opened[0].required_suite.digest
         stale = next(one for one, digest in zip(opened, digests, strict=True) if digest != now)
         why = "this run was judged by another version of the suite"
         again = evaluate_again(stale, suite)
-        raise UserError(f"{why}; `{again} --redo` judges it again", file=stale.run.path)
+        raise UserError(f"{why}; `{again} --redo` judges the run again", file=stale.run.path)
 
 
 def open_run(
@@ -96,7 +96,7 @@ def open_run(
 ) -> Results:
     """Read a judged run. If a completion such as `LunchTime/0/12` is given, read only the rows of its task.
 
-    `reuse_from` is another evaluation of the same run, whose completions need not be read again.
+    `ablated` selects the verdicts on common sense only. Completions are taken from `reuse_from` if possible.
     """
     from roboeval.evaluation.runs.folder import evaluation_of
     from roboeval.evaluation.runs.results import read_results
@@ -125,7 +125,7 @@ def open_run(
 def open_with_results(
     run: Path, suite_name: str, *, ablated: bool, rules: Path | None = None, reuse_from: Results | None = None
 ) -> Results:
-    """Read a run with `open_run`, and print what is not judged. Raise UserError if nothing is judged."""
+    """Read a run with `open_run`. Print a note if only a part is judged. Raise UserError if nothing is."""
     results = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from)
     unjudged = unjudged_sentence(results, suite_name, rules)
     if results.table.is_empty():
@@ -136,7 +136,7 @@ def open_with_results(
 
 
 def unjudged_sentence(results: Results, suite_name: str, rules: Path | None) -> str | None:
-    """Return a sentence on how many completions are judged and how to go on, or None if all are judged."""
+    """Return a sentence on how many completions are judged and how to judge the others. None if all are."""
     from roboeval.evaluation.runs.completions import how_many
 
     count, total = len(results.places), results.scope.total
@@ -145,7 +145,7 @@ def unjudged_sentence(results: Results, suite_name: str, rules: Path | None) -> 
 
 
 def evaluate_again(results: Results, suite_name: str, rules: Path | None = None) -> str:
-    """Return the command line of `roboeval evaluate` that continues an evaluation with its options."""
+    """Return the `roboeval evaluate` command that continues an evaluation with the same options."""
     from roboeval.evaluation.runs.folder import tasks_to_judge
 
     words, suite, ablated = [], results.required_suite, results.is_ablated

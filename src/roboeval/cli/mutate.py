@@ -77,7 +77,7 @@ def mutate(
 
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
-    """Read programs from runs or other sources, and return them by task. Duplicates are kept."""
+    """Return the programs of runs or other sources by task, with names such as `my-run:LunchTime/0/12`."""
     from roboeval.evaluation.runs.completions import name_of
     from roboeval.evaluation.runs.source import open_source
     from roboeval.mutation.mutants import Original
@@ -91,7 +91,7 @@ def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Or
 
 
 def show_scores(scores: Sequence[MutationScore], suite: str, *, brief: bool) -> None:
-    """Print the table of scores, the mutants that survived, and any warnings."""
+    """Print the table of scores, the mutants that survived (unless `brief`), and any warnings."""
     from rich.console import Group
 
     from roboeval.mutation.report import scores_view, survivors_view

@@ -12,7 +12,7 @@ from roboeval.cli.output import fail
 
 
 def path_to(what: str) -> Callable[[str], Path]:
-    """Return a path parser that rejects an empty string, which would mean the current folder."""
+    """Return a path parser that rejects an empty string and asks for `what` instead, such as `a run`."""
 
     def path(text: str) -> Path:
         return Path(text) if text else fail(f"the argument is empty; name {what}")

@@ -26,7 +26,7 @@ Watched = TypeVar("Watched")
 
 
 def show_progress(items: Iterable[Watched], doing: str, total: int) -> Iterator[Watched]:
-    """Yield the items, and show how many of `total` are done: as a bar, or as lines without a terminal."""
+    """Yield the items, and show progress such as `reading: 12 of 80` (as a bar if there is a terminal)."""
     with progress_meter(doing, total) as update:
         for done, item in enumerate(items, 1):
             yield item
@@ -57,7 +57,7 @@ def progress_meter(doing: str, total: int, before: int = 0) -> Iterator[Callable
 
 @contextmanager
 def stoppable(sentence: str = "the same command continues where it stopped") -> Iterator[None]:
-    """After Ctrl-C in the block, print `sentence`, which says how to go on, and exit."""
+    """On Ctrl-C in the `with` block, print `sentence`, which says how to continue, and exit."""
     try:
         yield
     except KeyboardInterrupt:

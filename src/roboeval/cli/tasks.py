@@ -72,7 +72,7 @@ def start(task: str, suite: str) -> None:
 
 
 def lint_tasks(suite: Suite, tasks: Sequence[Task], *, accepted: bool) -> None:
-    """Print the findings of the linter. Exit with status 1 unless all of them are accepted."""
+    """Print the linter's findings, also accepted ones if `accepted`. Exit with status 1 if others exist."""
     from codebotler.simulator.pool import cores
     from roboeval.linting.findings import render
     from roboeval.linting.lint import lint

@@ -41,7 +41,7 @@ DrawnFigures = Mapping[str, bytes]  # SVG files by name
 
 
 def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawings: DrawnFigures) -> str:
-    """Return the report's HTML, with `drawings` as figures. All text is escaped, so it can do no harm."""
+    """Return a report as HTML, with all text escaped. `lead` introduces it; `drawings` has its SVGs."""
     script = PAGE_SCRIPT.read_text()
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"

@@ -23,7 +23,7 @@ def published() -> dict[str, Any]:
 
 
 def model_of(run: JudgedRun) -> str | None:
-    """Return the paper's name for a run's model, found by its recorded name or folder. None if unsure."""
+    """Return the paper's name for a run's model, or None if another suite judged the run or no name fits."""
     if run.results.manifest.get("suite") != PAPER_SUITE or run.is_mixed:
         return None
     provider, colon, name = (run.model or run.folder).lower().partition(":")
@@ -33,31 +33,31 @@ def model_of(run: JudgedRun) -> str | None:
 
 
 def recognised_models(runs: Iterable[JudgedRun]) -> list[str]:
-    """Return a sentence that lists the runs by models of the paper, or an empty list if there are none."""
+    """Return a list with a sentence that names the runs by models of the paper. Empty if there are none."""
     pairs = [f"{run.name} is {model}" for run in runs if (model := model_of(run)) is not None]
     return [f"Recognised by name as models of the paper: {', '.join(pairs)}."] if pairs else []
 
 
 def uses_authors_prompts(run: JudgedRun) -> bool:
-    """Whether the completions were imported and answer the authors' prompts instead of the suite's."""
+    """Whether a run's completions were imported and answer the prompts of the paper's authors."""
     ours = {prompt for task in run.suite.tasks.values() for prompt in task.prompts}
     return "settings" not in run.results.about and not ours & {*run.instructions.values()}
 
 
 def cell(model: str, task: str, prompt: int) -> float | None:
-    """Return a model's published pass@1 on one of the authors' prompts (from 0), or None if there is none."""
+    """Return a model's published pass@1 on one of the paper's prompts (from 0), or None if there is none."""
     rows = published()["pass_at_1"].get(task, [])
     return rows[prompt][_column(model)] if prompt < len(rows) else None
 
 
 def task_mean(model: str, task: str) -> float | None:
-    """Return a model's published pass@1 of a task, the mean over its prompts, or None if there is none."""
+    """Return a model's published mean pass@1 over the prompts of a task, or None if there is none."""
     rows = published()["pass_at_1"].get(task)
     return None if rows is None else sum(row[_column(model)] for row in rows) / len(rows)
 
 
 def overall_mean(model: str, tasks: Sequence[str]) -> float | None:
-    """Return the mean of the published pass@1 over tasks, or None if a task was not published."""
+    """Return a model's published pass@1, averaged over tasks, or None if it is missing for a task."""
     means = [mean for task in tasks if (mean := task_mean(model, task)) is not None]
     return sum(means) / len(means) if means and len(means) == len(tasks) else None
 

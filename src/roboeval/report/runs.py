@@ -26,7 +26,7 @@ MAX_DRAWN_RUNS = 8  # readers cannot tell apart more colours
 
 @dataclass(frozen=True, eq=False)
 class JudgedRun:
-    """A run with its verdicts in a suite and, if there are any, its verdicts under other requirements."""
+    """A run in a report: its verdicts and, if any, those by an ablation, another suite or house rules."""
 
     results: Results
     table: pl.DataFrame  # the column `accepted` is null for unchecked programs
@@ -95,18 +95,18 @@ class JudgedRun:
 
     @cached_property
     def checked(self) -> tuple[CheckedPrompt, ...]:
-        """The counts of each prompt's completions by check and verdict. Empty if any program is unchecked."""
+        """By prompt, how many programs the check accepts and how many pass. Empty if any is unchecked."""
         return () if self.table["accepted"].null_count() else count_by_prompt(self.table)
 
 
 def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
-    """Return the tasks that have completions in any run, in the order of the suite."""
+    """Return the names of the tasks that have completions in any run, in the order of the suite."""
     judged = {score.task for run in runs for score in run.scores}
     return [task for task in dict.fromkeys([*runs[0].suite.tasks, *sorted(judged)]) if task in judged]
 
 
 def runs_to_draw(runs: Sequence[JudgedRun]) -> tuple[list[JudgedRun], list[str]]:
-    """Return the best runs that fit into a figure, and a sentence for its caption if others are left out."""
+    """Return the best runs, at most 8, and a list with a sentence for the caption if others are left out."""
     best = sorted(runs, key=lambda run: -run.mean)[:MAX_DRAWN_RUNS]
     left_out = [f"Only the {len(best)} best of {len(runs)} runs are shown."] if len(best) < len(runs) else []
     return [run for run in runs if run in best], left_out
@@ -124,7 +124,7 @@ def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
-    """Parse labels such as `my-run=Mine`. Return each by the index of its run's folder in `paths`."""
+    """Parse labels such as `my-run=Mine`, and return them by the index in `paths` of the run they name."""
     labels: dict[int, str] = {}
     names = [{str(path), path.resolve().name} for path in paths]
     for text in texts:
@@ -140,7 +140,7 @@ def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
 
 
 def read_prices(texts: Sequence[str]) -> dict[str, Price]:
-    """Parse prices of the form `MODEL=INPUT/OUTPUT`, and return them by model."""
+    """Parse prices such as `my-model=2.5/10` (input/output per million tokens). Return them by model."""
     prices: dict[str, Price] = {}
     for text in texts:
         model, _, numbers = text.rpartition("=")
@@ -151,7 +151,7 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
 
 
 def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
-    """Name each run after its label or model. Add the folder or a number to names that would be equal."""
+    """Name each run by its label, else its model or folder. Add the folder or a number to equal names."""
     given = [labels.get(at) or run.model or run.folder for at, run in enumerate(runs)]
     plain = [short_name(name, MAX_RUN_NAME) for name in given]
     with_folder = [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)]
@@ -167,7 +167,7 @@ def _extend_duplicates(names: Sequence[str], longer: Sequence[str]) -> list[str]
 
 
 def price_runs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> list[JudgedRun]:
-    """Give each run the price for its folder, name or model. Raise UserError if a price fits no run."""
+    """Return the runs with prices, found by folder, name or model. Raise UserError if a price fits no run."""
     names = [(run.folder, run.name, run.model or "") for run in runs]
     for model in prices:
         if not any(model in those for those in names):

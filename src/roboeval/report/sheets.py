@@ -31,7 +31,7 @@ def page_words() -> dict[str, dict[str, Any]]:
 
 
 def page_text(kind: str, name: str) -> Any:  # noqa: ANN401 - a string, or a mapping for tables
-    """Return an entry of page.yaml, such as `overall` of the kind `figures`. For tables, it is a mapping."""
+    """Return an entry of page.yaml, such as `overall` of kind `figures`: a text or, for tables, a mapping."""
     return page_words()[kind][name]
 
 
@@ -48,7 +48,7 @@ class Column(NamedTuple):
 
 
 class Sheet(NamedTuple):
-    """A table of a report."""
+    """A table of a report, which is also written as a CSV file."""
 
     name: str  # the key in page.yaml and the name of the CSV file
     columns: Sequence[Column]
@@ -59,7 +59,7 @@ class Sheet(NamedTuple):
 def sheet(
     name: str, rows: Sequence[Sequence[Any]], *, notes: Sequence[str] = (), shares: Sequence[str] = ()
 ) -> Sheet:
-    """Create a table with the columns in page.yaml, followed by a column of shares for each of `shares`."""
+    """Create a table with the columns that page.yaml gives, then a column of shares for each of `shares`."""
     kinds = page_text("tables", name)["columns"]
     columns = [Column(head, kind) for part in kinds for kind, heads in part.items() for head in heads]
     return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)
@@ -74,13 +74,13 @@ class ReportFigure(NamedTuple):
 
 
 class Prose(NamedTuple):
-    """Paragraphs of plain text."""
+    """Paragraphs of a report. Text in backticks is shown as code."""
 
     paragraphs: Sequence[str]
 
 
 class Groups(NamedTuple):
-    """Groups of similar failures, each with the name of a run."""
+    """Groups of similar failures in a report, each with the name of its run."""
 
     shown: Sequence[tuple[str, FailureGroup]]
 
@@ -97,7 +97,7 @@ class Card(NamedTuple):
 
 
 class Cards(NamedTuple):
-    """Summaries of runs, shown side by side."""
+    """Summaries of runs, shown side by side at the start of a report."""
 
     cards: Sequence[Card]
 
@@ -106,7 +106,7 @@ Part: TypeAlias = Sheet | ReportFigure | Prose | Groups | Cards
 
 
 class Section(NamedTuple):
-    """A section of a report."""
+    """A section of a report: its tables, figures and texts, in order."""
 
     name: str  # the key in page.yaml and the anchor
     parts: Sequence[Part]
@@ -125,7 +125,7 @@ def _is_empty(part: Part) -> bool:
 
 
 def write_csv(table: Sheet, folder: Path) -> None:
-    """Write a table with full precision to a CSV file in a folder, named after the table."""
+    """Write a table with full precision to a folder, as a CSV file with the table's name."""
     types = {"text": pl.String, "class": pl.String, "count": pl.Int64}
     kinds = [types.get(column.kind, pl.Float64) for column in table.columns]
     schema = dict(zip(_heads(table.columns), kinds, strict=True))

@@ -53,7 +53,7 @@ def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
 
 
 def sections(runs: Sequence[JudgedRun], *, with_published: bool = False, command: str = "") -> list[Section]:
-    """Return the non-empty sections of a report on runs of one suite. `command` is its command line."""
+    """Return a report's non-empty sections, optionally with published causes. The last shows `command`."""
     found = [
         glance_section(runs),
         scores.results_section(runs),
@@ -110,7 +110,7 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
-    """Describe the suite and its simulation settings, and introduce the command that makes the report."""
+    """Return sentences on the suite and its settings. The last one introduces the report's command."""
     head = runs[0].results.manifest
     version, digest = head.get("version"), head.get("digest")
     return (
@@ -124,7 +124,7 @@ def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
 
 
 def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], out: Path) -> Iterator[str]:
-    """Write a report to the folder `out`. Yield the name of each part after writing it, the page last."""
+    """Write a report to the folder `out`. Yield the name of each table and figure written, then `page`."""
     parts = [part for section in sections for part in section.parts]
     (out / "tables").mkdir(parents=True, exist_ok=True)
     if not (out / PAGE_FILE).exists():
@@ -158,7 +158,7 @@ def expect_no_others(out: Path) -> None:
     start = page_file.read_bytes()[:GENERATOR_WITHIN] if page_file.is_file() else b""
     if others and GENERATOR.encode() not in start:
         found = f'contains other files such as "{others[0]}"'
-        raise UserError(f"is not a report but {found}; choose another folder", file=out)
+        raise UserError(f"the folder is not a report but {found}; choose another folder", file=out)
 
 
 def count_parts(sections: Sequence[Section]) -> int:

@@ -13,14 +13,14 @@ _TEMPLATE = Path(__file__).parent / "template"
 
 
 def new_task(folder: Path, name: str) -> Path:
-    """Write the missing files of a new task (and of a new suite), and return the path of the task file."""
+    """Create the files of a new task, and of the suite if needed. Return the path of the task file."""
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name):
         raise UserError(f'"{name}" is not a task name; join capitalised words, as in WaterPlants')
     if (folder.resolve().parent / "suite.yaml").exists():
-        raise UserError("is a subfolder of a suite; choose the folder of the suite itself", file=folder)
+        raise UserError("the folder is a subfolder of a suite; choose the suite's own folder", file=folder)
     path = folder / "tasks" / f"{name}.yaml"
     if path.exists():
-        raise UserError("already exists; edit the file or choose another name", file=path)
+        raise UserError("the task already exists; edit its file or choose another name", file=path)
     files = {
         folder / "suite.yaml": ("new-suite.yaml", _suite_name(folder)),
         folder / "solutions" / path.name: ("new-solutions.yaml", ""),

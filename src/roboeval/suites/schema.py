@@ -47,7 +47,7 @@ class CheckFile(StrictForm):
     """A check in a task file: a formula that requirements name, such as `asks_in(room)`.
 
     Args:
-        means: how explanations describe the check's texts, by kind of event. A single string is for `say`.
+        means: the meaning of the check's regexes, for explanations, by kind of event. A string is for `say`.
     """
 
     category: Category  # the kind of failure if the check fails
@@ -100,7 +100,7 @@ class AcceptedFinding(StrictForm):
 class ScenarioFile(WorldFile):
     """A world in a task file, with its requirements.
 
-    In its ablation, `ablation` is used instead of `require`, and `ablation_people` instead of `people`.
+    To judge common sense only, `ablation` replaces `require`, and `ablation_people` replaces `people`.
     """
 
     about: Name
@@ -134,7 +134,7 @@ class SampledThingFile(StrictForm):
 
 
 class CornerFile(StrictForm):
-    """A world of a sampled task with some values set by hand. All others are the first in their lists."""
+    """A world of a sampled task with some values set by hand. Other values are the first of their lists."""
 
     about: Name
     set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}
@@ -169,7 +169,7 @@ class TaskFile(_AnyTaskFile):
 
 
 class SampledTaskFile(_AnyTaskFile):
-    """A task file whose worlds are sampled. `let` names values, and `phrases` names lists of regexes."""
+    """A task file whose worlds are sampled. `let` defines values by name, `phrases` lists of regexes."""
 
     worlds: SampledWorldsFile
     let: dict[Name, Annotated[str, BeforeValidator(str)]] = {}
@@ -178,7 +178,7 @@ class SampledTaskFile(_AnyTaskFile):
 
 
 class LimitsFile(StrictForm):
-    """The limits in suite.yaml after which a run ends. `ticks` are loop iterations and function calls."""
+    """The limits of one run of a program, in suite.yaml. `ticks` are loop iterations and function calls."""
 
     seconds: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] = 3600.0  # simulated
     calls: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 1_000  # of skills
@@ -188,11 +188,11 @@ class LimitsFile(StrictForm):
 def _moment(value: object) -> object:
     if isinstance(value, datetime) and value.tzinfo is not None and 1970 <= value.year < 2100:  # noqa: PLR2004 - the message names these years
         return value
-    raise ValueError("it should be a time in 1970 to 2099 with an offset, such as 2024-01-01T12:00:00+00:00")
+    raise ValueError("a time in 1970 to 2099 with an offset is needed, such as 2024-01-01T12:00:00+00:00")
 
 
 class SimulationFile(StrictForm):
-    """The simulation settings in a suite file."""
+    """The simulation settings under `rules` in suite.yaml, such as the limits and the start of the clock."""
 
     literals: Literal["lowercase", "as-written"] = "lowercase"
     matching: Matching = "label-in-request"
@@ -219,7 +219,7 @@ class SimulationFile(StrictForm):
 
 
 class SuiteFile(StrictForm):
-    """The content of suite.yaml."""
+    """The content of suite.yaml: the suite's name and version, its worlds, and its simulation settings."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")]
     version: Annotated[int, Field(strict=True, ge=0)]

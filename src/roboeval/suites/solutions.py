@@ -24,7 +24,7 @@ class EquivalentMutantFile(StrictForm):
 
 
 class SolutionsFile(StrictForm):
-    """The content of a file of solutions."""
+    """The content of a solutions file: programs, replies of recorded models, and equivalent mutants."""
 
     recorded: tuple[InstructionSolutions, ...] = ()  # replies of the recorded models
     programs: tuple[Solution, ...] = ()
@@ -32,7 +32,7 @@ class SolutionsFile(StrictForm):
 
 
 def solutions(task: Task) -> tuple[Solution, ...]:
-    """Return the distinct solutions of a task, also from the suite that lends its instruction, if any."""
+    """Return the different solutions of a task, including those of the suite whose instruction it borrows."""
     folders = [task.path.parents[1], *([LENDING_SUITE] if task.borrows else [])]
     distinct: dict[str, Solution] = {}
     for form in (_read(folder, task) for folder in folders):
@@ -52,7 +52,7 @@ def locate_solution(task: Task, solution: Solution) -> tuple[Path, int | None]:
 
 
 def equivalent_mutants(task: Task) -> Mapping[tuple[str, str], str]:
-    """Return the reasons why a task's equivalent mutants are right, by operator and diff."""
+    """Return why a task's equivalent mutants are right, by mutation operator and diff (as in `bare_diff`)."""
     listed = _read(task.path.parents[1], task).equivalent_mutants
     return {(one.operator, bare_diff(one.diff)): one.because.strip() for one in listed}
 

@@ -49,11 +49,11 @@ class HouseRules:
     def read(
         cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (), *, of_suite: bool = False
     ) -> HouseRules:
-        """Read a file of house rules. Raise UserError if it is invalid or names a room that `rooms` lacks."""
+        """Read a file of house rules. Raise UserError if a rule is wrong or names a room not in `rooms`."""
         rules = read_rules(path, skills, rooms)
         if not of_suite and not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
             mend = "use lower-case letters, digits and dashes"
-            raise UserError(f"is not a valid file name for rules; {mend}", file=path)
+            raise UserError(f"the file name is not valid for house rules; {mend}", file=path)
         return cls("" if of_suite else path.stem, rules, hashlib.sha256(path.read_bytes()).hexdigest())
 
 
@@ -93,7 +93,7 @@ class Suite:
 
     @property
     def house_sentences(self) -> list[str]:
-        """Return the house rules as sentences for the prompt."""
+        """Return the house rules as sentences for the model prompt."""
         return [rule.says for rule in self.house_rules]
 
     def with_house_rules(self, house: HouseRules | None) -> Suite:
@@ -119,7 +119,7 @@ class Suite:
         return read_suite(self.folder, self.skills, count or self.worlds, seed).with_house_rules(self.house)
 
     def with_own_worlds(self) -> Suite:
-        """Return the suite as its files describe it, if its worlds are sampled; else return it unchanged."""
+        """Undo `with_worlds`: read the suite again from its files, if its worlds are sampled."""
         if self.worlds is None or self.folder is None:
             return self
         return read_suite(self.folder, self.skills)
@@ -138,7 +138,7 @@ def task_files(folder: Path) -> list[Path]:
 
 
 def read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed: int | None = None) -> Suite:
-    """Read the suite in a folder. By default, suite.yaml gives `count` (the worlds per task) and `seed`."""
+    """Read the suite in a folder. `count` (worlds per task) and `seed` replace the values in suite.yaml."""
     files = [*sorted(folder.glob("*.yaml")), *sorted(folder.glob("*.py")), *task_files(folder)]
     stats = [(file.name, file.stat()) for file in files if file.is_file()]
     versions = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
@@ -160,7 +160,7 @@ def _build_suite(
         raise file.wrong(sentence, "name")
     paths = task_files(folder)
     if not paths:
-        raise UserError("contains no tasks; add a file for each task", file=folder / "tasks")
+        raise UserError("the folder contains no tasks; add a file for each task", file=folder / "tasks")
     count, seed = count or head.worlds, head.seed if seed is None else seed
     documents = [YamlFile.read(path) for path in paths]
     words = head.rules.words_for_people

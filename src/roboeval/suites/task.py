@@ -23,7 +23,7 @@ class Requirement:
     """A formula that the trace of a program must satisfy in a world (paper, section IV.B).
 
     Args:
-        words: the prompts that ask for it, as pairs of number and words; empty if all prompts do.
+        words: pairs of a prompt's number and the words in it that ask for this; empty if all prompts ask.
         arguments: the values for the check's parameters, such as `amy` in `greets("amy")`.
     """
 
@@ -42,7 +42,7 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A world with its requirements."""
+    """A world and the requirements that a program must satisfy in it."""
 
     world: World
     require: tuple[Requirement, ...]
@@ -60,7 +60,7 @@ class TaskCheck:
     """A named formula in a task, such as `asks_in(room)`. Requirements call it with arguments.
 
     Args:
-        means: how explanations describe its texts, by kind of event, with `{parameter}` as in `rtl`.
+        means: the meaning of its regexes, for explanations, by kind of event; may contain `{parameter}`.
     """
 
     name: str  # the name that requirements use
@@ -103,12 +103,12 @@ class Task:
         return f"Task({self.name!r}, {prompts}, {worlds})"
 
     def judged_in(self, *, ablated: bool = False) -> tuple[Scenario, ...]:
-        """Return the worlds in which programs are judged; an empty tuple if `ablated` without an ablation."""
+        """Return the worlds in which programs are judged; if `ablated`, the ablation's worlds or ()."""
         return (self.ablation or ()) if ablated else self.scenarios
 
 
 def plain_check(text: str) -> str:
-    """Shorten a requirement for display: replace regexes by examples, as in `offers("bread")`."""
+    """Replace regexes in a requirement by examples: `offers("bread|loaf")` gives `offers("bread")`."""
     return _STRINGS.sub(
         lambda found: json.dumps(first_choice(literal_eval(found[0])), ensure_ascii=False), text
     )
@@ -117,7 +117,7 @@ def plain_check(text: str) -> str:
 def world_title(number: int, total: int | None, about: str) -> str:
     """Return the title of a world, such as `World 2 of 9: nobody is in the lab`.
 
-    If `total` is 1, the title has no number, because an agent's only world may be any world of its task.
+    The title has no number if `total` is 1 (for an agent's mission), and no total if `total` is None.
     """
     which = "" if total == 1 else f" {number}" if total is None else f" {number} of {total}"
     return f"World{which}: {about.removeprefix(f'{number}: ')}"

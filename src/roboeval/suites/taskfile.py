@@ -106,7 +106,7 @@ def _covered_by(
         if fact not in facts:
             raise file.wrong(f'there is no fact "{fact}"; add it under facts', "covered_by", fact)
         if isinstance(names, str) and names in checks:
-            raise file.wrong(f'"{names}" is a check; write it as [{names}]', "covered_by", fact)
+            raise file.wrong(f'the check "{names}" must be in a list; write [{names}]', "covered_by", fact)
         if unknown := next((name for name in names if isinstance(names, list) and name not in checks), None):
             raise file.wrong(f'there is no check "{unknown}"; add it under checks', "covered_by", fact)
         yield fact, names if isinstance(names, str) else tuple(names)
@@ -157,7 +157,7 @@ class _Reader:
 
         match, body = _HEAD.fullmatch(head), self.form.checks[head]
         if match is None:
-            raise wrong(f'"{head}" does not name a check; write name or name(p1, p2)')
+            raise wrong(f'"{head}" is not a valid name of a check; write name or name(p1, p2)')
         name = match[1]
         parameters = tuple(p.strip() for p in match[2].split(",")) if match[2] else ()
         if START in parameters:
@@ -191,7 +191,7 @@ class _Reader:
 
     def read_ablation(self, worlds: Sequence[ScenarioFile]) -> Iterator[Scenario]:
         if any(world.ablation is None for world in worlds):
-            raise self.file.wrong("some worlds lack an ablation; add it to all or to none", "worlds")
+            raise self.file.wrong("some worlds have no ablation; add one to all worlds or to none", "worlds")
         for number, form in enumerate(worlds):
             people = form.people if form.ablation_people is None else form.ablation_people
             changed = form.model_copy(update={"people": people})

@@ -45,12 +45,12 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
 
     @api.get("/{run}")
     def show_run(run: str, evaluation: EvaluationQuery = None) -> Response:
-        """Show one run with all prompts and all kinds of failure."""
+        """Return one run, with the pass rate of each prompt and the number of failures of each kind."""
         return _json(run_details(store.open(run, evaluation)))
 
     @api.get("/{run}/report")
     def show_report(run: str) -> Response:
-        """Show the report in the folder of a run, created by `roboeval run` or `roboeval report`."""
+        """Return the report in a run's folder as HTML. `roboeval run` and `roboeval report` write reports."""
         # Forbid scripts, because the folder may contain any page instead of a report.
         headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
         return HTMLResponse(store.report(run), headers=headers)
@@ -79,7 +79,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
     def show_completion(
         run: str, task: str, prompt: int, index: int, evaluation: EvaluationQuery = None
     ) -> Response:
-        """Show one completion with its program, and the robot's actions and failed checks in each world."""
+        """Return one completion: its program, and the robot's actions and failed checks in each world."""
         return _json(completion_details(store.open(run, evaluation), name_of((task, prompt, index))))
 
     return api

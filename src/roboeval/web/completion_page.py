@@ -42,7 +42,7 @@ NEIGHBOUR_LINKS = ("Previous completion", "Next completion")
 async def draw_completion(
     store: RunStore, run: str, name: str, chosen: CompletionFilter, evaluation: str | None
 ) -> None:
-    """Draw a completion of a run, with links to the previous and the next one that `chosen` selects."""
+    """Draw the page of a completion, with links to its neighbours among those that `chosen` selects."""
 
     def read() -> tuple[Snapshot, dict[str, Any]]:
         snapshot = store.open(run, evaluation)

@@ -21,7 +21,7 @@ EMPTY_CELL = {"text": "", "shade": "none"}
 
 
 def shade(share: float | None, *, bad: bool) -> str:
-    """Return a cell's CSS class: `s7` for 0.7, or `f7` if a high share is `bad`, and `waits` for None."""
+    """Return the CSS class for a share: `s7` for 0.7, `f7` if high shares are `bad`, and `waits` for None."""
     if share is None:
         return "waits"
     step = round(share * SHADE_STEPS)
@@ -36,7 +36,7 @@ def run_address(run: str) -> str:
 
 
 def models_of(run: Snapshot) -> str:
-    """Return the names of a run's models, separated by commas and shortened if the list is long."""
+    """Return the names of a run's models as a text, shortened if it is long, or `model not recorded`."""
     if not run.models:
         return "model not recorded"
     return shortened(", ".join(run.models), MAX_MODELS_TEXT) + recorded_suffix(run.models)
@@ -54,14 +54,14 @@ def failure_text(chosen: CompletionFilter) -> str | None:
 
 
 def verb_of(chosen: CompletionFilter) -> str:
-    """Return what the selected completions did: `passed`, `failed` or, for example, `ended in NameError`."""
+    """Return what completions selected by a filter did, such as `passed` or `ended in NameError`."""
     if (by := failure_text(chosen)) is not None:
         return f"ended {by}"
     return "failed" if chosen.passed is False else "passed"
 
 
 class TaskCells:
-    """Computes the cells of a run in a heat map of tasks by prompts, and marks the selected cell."""
+    """Computes a run's cells in a heat map of tasks (rows) by prompts (columns). Marks the selected cell."""
 
     def __init__(self, run: Snapshot, chosen: CompletionFilter, evaluation: str | None = None) -> None:
         self._run, self._filter, self._evaluation = run, chosen, evaluation
@@ -80,7 +80,7 @@ class TaskCells:
         return [{"name": "mean", "title": "mean over the prompts"}, *numbers]
 
     def row(self, task: str) -> list[dict[str, Any]]:
-        """Return the cells of a task: its mean, and one for each prompt."""
+        """Return the cells of a task: its mean and one for each prompt, or one cell without completions."""
         prompts = self.tasks.get(task)
         if prompts is None:
             return [{**EMPTY_CELL, "text": "no completions", "span": 1 + self._prompts}]

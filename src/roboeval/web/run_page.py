@@ -33,7 +33,7 @@ RUN_DELETED = "This run was deleted or renamed. The page shows its last known st
 
 
 async def draw_run(store: RunStore, name: str, chosen: CompletionFilter, evaluation: str | None) -> None:
-    """Draw a run with its results, and with a list of the completions that `chosen` selects at first."""
+    """Draw the page of a run with its results. At first it lists the completions that `chosen` selects."""
     page = _RunPage(store, await asyncio.to_thread(store.open, name, evaluation), chosen, evaluation)
     page.timer = ui.timer(REFRESH_SECONDS, page.refresh, immediate=False)
 

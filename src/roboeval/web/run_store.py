@@ -43,7 +43,7 @@ class RunStore:
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """Return a run's latest snapshot. `key` names an evaluation, by default one of all requirements."""
+        """Return a run's latest snapshot. `key` names an evaluation, by default no ablation if possible."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
@@ -56,7 +56,7 @@ class RunStore:
         try:
             if _stamp(path, self.folder.resolve()) is not None:
                 if (size := path.stat().st_size) > MAX_REPORT_BYTES:
-                    raise UserError(f"is too large to show ({size:,} bytes); open it on disk", file=path.name)
+                    raise UserError(f"{size:,} bytes are too many to show; open it on disk", file=path.name)
                 return path.read_bytes()
         except OSError:
             pass
@@ -71,7 +71,7 @@ class RunStore:
         return True
 
     def suite(self, name: str) -> Suite | None:
-        """Load a built-in, installed or given suite. Return None if it is unavailable."""
+        """Load a given, built-in or installed suite by name. Return None if it is missing or not valid."""
         if name not in self._suites:
             try:
                 self._suites[name] = load_suite(name) if has_suite(name) else None
@@ -89,7 +89,7 @@ class RunStore:
         except FileNotFoundError:
             return {}
         except OSError as error:
-            raise UserError(f"cannot be read ({error.strerror})", file=self.folder) from None
+            raise UserError(f"the folder cannot be read ({error.strerror})", file=self.folder) from None
 
     def _reader(self, name: str, key: str | None) -> _Reader:
         path = self._folders().get(name)  # looking up names prevents paths to other folders
@@ -101,7 +101,7 @@ class RunStore:
         keys = (path.stem for path in run.rows("").parent.glob("*.jsonl"))
         known = tuple(sorted(keys, key=lambda one: (one.endswith(ABLATED), one)))
         if key is not None and key not in known:
-            raise UserError(f'"{shortened(name)}" has no evaluation "{shortened(key)}"')
+            raise UserError(f'the run "{shortened(name)}" has no evaluation "{shortened(key)}"')
         reader = self._reader_of(run, key or next(iter(known), None))
         reader.evaluations = known
         return reader
@@ -171,7 +171,7 @@ def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
     if not found.is_relative_to(within):
         raise UserError(OUTSIDE_FOLDER, file=path.name)
     if not stat.S_ISREG(status.st_mode):
-        raise UserError("is not a regular file; replace or remove it", file=path.name)
+        raise UserError("the path is not a regular file; replace or remove it", file=path.name)
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 

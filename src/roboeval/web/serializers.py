@@ -22,7 +22,7 @@ MAX_SUITE_NAME, MAX_FAILURE_REASON = 120, 300
 
 
 class RunState(StrEnum):
-    """The state of a run, as the pages and the API name it."""
+    """The state of a run, such as `being judged`, as the pages and the API show it."""
 
     READING = "being read"
     GENERATING = "being generated"
@@ -35,7 +35,7 @@ class RunState(StrEnum):
 
 
 def state_of(run: Snapshot) -> RunState:
-    """Return how far a run is: for example, `unfinished` if a completion is missing or not judged."""
+    """Return the state of a run, such as `unfinished` if a completion is missing or not judged."""
     written, coverage = len(run.results.completions), run.results.coverage
     lacks = coverage.there < coverage.total
     unjudged = run.judged < run.results.scope.total
@@ -95,7 +95,7 @@ def date_of(about: Mapping[str, Any]) -> str | None:
 
 
 def notes(run: Snapshot) -> list[str]:
-    """Return sentences on what to know about a run, such as that replies were cut off."""
+    """Return warnings and remarks about a run as sentences, for example that replies were cut off."""
     results = run.results
     found = []
     if (missions := results.scope.missions_sentence) is not None:
@@ -119,7 +119,7 @@ class RunList:
         self._known: dict[str, tuple[Hashable, dict[str, Any]]] = {}
 
     def data(self, seconds: float = math.inf) -> list[dict[str, Any]]:
-        """Return a summary of each run, or why it cannot be read. After `seconds`, read no more runs."""
+        """Return a summary of each run, or why it cannot be read. After `seconds`, use earlier summaries."""
         until = time.monotonic() + seconds
         return [self._run_data(name, may_read=time.monotonic() < until) for name in self._store.names()]
 
@@ -140,7 +140,7 @@ class RunList:
 
 
 def run_details(run: Snapshot) -> dict[str, Any]:
-    """Return `run_data` and, in addition, pass@1 of each task and prompt and the failures of each kind."""
+    """Return `run_data`, with pass@1 of each task and prompt and the number of failures of each kind."""
     means = {score.task: score.pass_at(1).mean for score in run.scores}
     tasks: dict[str, list[dict[str, Any]]] = {}
     for prompt in run.prompts(CompletionFilter(passed=True)):

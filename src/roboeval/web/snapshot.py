@@ -69,7 +69,7 @@ class CompletionFilter:
         return replace(self, task=None, prompt=None)
 
     def query(self, evaluation: str | None) -> str:
-        """Return the query of a URL, such as `?task=CountMen&passed=false`. It is empty without a filter."""
+        """Return the filter and `evaluation` as a URL query such as `?task=CountMen`, empty without both."""
         values = {"evaluation": evaluation, **asdict(self)}
         if self.passed is not None:
             values["passed"] = str(self.passed).lower()
@@ -105,8 +105,8 @@ class Snapshot:
     def completions(self) -> pl.DataFrame:
         """One row for each completion in the order of the suite.
 
-        `passed` is null if the completion was not judged. `worlds` contains a sign for each world. `why` is
-        the check or error that caused the failure.
+        `passed` is null if the completion was not judged. `worlds` has a sign for each world: + satisfied,
+        - not satisfied, ! error. `why` is the check, limit or error that caused the failure.
         """
         signs = pl.when(HAS_NO_PROGRAM.first()).then(pl.lit("")).otherwise(WORLD_SIGN.str.join(""))
         judged = self.results.table.group_by(KEY, maintain_order=True).agg(
@@ -124,7 +124,7 @@ class Snapshot:
         return every.with_columns(pl.col("worlds", "why").fill_null("")).sort(place, *KEY)
 
     def row(self, name: str) -> dict[str, Any] | None:
-        """Find the row of a completion by its name. Return None if there is no such completion."""
+        """Return the row of a completion by its name, such as `CountMen/0/12`, or None if there is none."""
         found = self.completions.filter(pl.format("{}/{}/{}", *KEY) == name)
         return found.row(0, named=True) if found.height else None
 
@@ -135,13 +135,13 @@ class Snapshot:
     def neighbours(
         self, key: CompletionKey, chosen: CompletionFilter
     ) -> tuple[CompletionKey | None, CompletionKey | None]:
-        """Return the previous and the next completion in the filtered list, or None where there is none."""
+        """Return the completions before and after `key` that `chosen` selects; None where there is none."""
         keys = [None, *self.select(chosen).select(KEY).iter_rows(), None]
         at = keys.index(key) if key in keys else None
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
     def prompts(self, chosen: CompletionFilter) -> list[dict[str, Any]]:
-        """Count the `written` and `judged` completions of each prompt, and those that match (`counted`).
+        """Count the `written` and `judged` completions of each prompt, and those selected (`counted`).
 
         The filter's own task and prompt are ignored. `share` is counted / judged, or None if none is judged.
         """

@@ -51,7 +51,7 @@ class _DataElement(Element):
 
 
 class HeatMap(_DataElement, component="static/heat.js"):
-    """A table of shaded shares. A click on a cell calls `chosen` with task and prompt, or opens its link.
+    """A table of shares as shaded cells. A click calls `chosen` with task and prompt, or opens a link.
 
     Its properties are `groups` with `name`, `href` and `columns` (`name`, `title`, `href`), and `rows` with
     `name` and `cells` (`text`, `shade`, `title`, `href`, `at`).
@@ -100,7 +100,7 @@ def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = 
 
 
 def count_text(data: Mapping[str, Any]) -> str:
-    """Format how many completions of a run are judged (or else written), such as `12 of 80 judged`."""
+    """Format how many completions are judged or, if none is, written, such as `12 of 80 judged`."""
     if "completions" not in data:
         return MISSING
     coverage = Coverage(data["judged"], data["to_judge"], data["requested"])
@@ -117,7 +117,7 @@ def tasks_text(data: Mapping[str, Any]) -> str:
 
 
 def date_text(data: Mapping[str, Any]) -> str:
-    """Format the start time of a run in UTC, such as `2026-11-29 12:30`."""
+    """Format the start time of a run in UTC, such as `2026-11-29 12:30`, or `-` if it was not recorded."""
     return (data.get("date") or MISSING)[:16].replace("T", " ")
 
 

@@ -178,7 +178,7 @@ def test_names_that_lead_elsewhere_are_not_found(server: PageServer, name: str) 
 def test_missing_runs_evaluations_and_completions_are_named(server: PageServer) -> None:
     for path, sentence in (
         ("/api/runs/none", 'this folder has no run "none"; it may have been deleted'),
-        ("/api/runs/hasty?evaluation=none", '"hasty" has no evaluation "none"'),
+        ("/api/runs/hasty?evaluation=none", 'the run "hasty" has no evaluation "none"'),
         ("/api/runs/hasty/completions/LunchBreak/0/99", 'this run has no completion "LunchBreak/0/99"'),
     ):
         answer = server.call("GET", path)

@@ -50,7 +50,7 @@ def compare(
     ablation: AblationOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Show how much better one run is, and how certain that is.
+    """Show how much better the second run is, and how certain that is.
 
     The difference is the second run's pass rate minus the first's.
     """
@@ -94,7 +94,7 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
 
 
 def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:
-    """Print which verdicts the second of two suites changes. `suites` is such as `paper,plus`."""
+    """Print which verdicts the second of two suites (`paper,plus`) changes, and `most` groups of programs."""
     from roboeval.analysis.comparisons.verdict_changes import changes_data, verdict_changes
     from roboeval.cli.views.comparison import changes_view
     from roboeval.evaluation.runs.completions import how_many
@@ -155,7 +155,7 @@ def resample(
 
 
 def check_run(results: Results, engine: OpenEngine) -> pl.DataFrame:
-    """Check the programs of a run and save the results. Return its table with the new column `accepted`."""
+    """Check a run's programs and save the results. Return the run's table with the column `accepted`."""
     from roboeval.evaluation.runs.table import with_answers
 
     completions = [results.completions[key] for key in results.places]
@@ -167,7 +167,7 @@ def check_run(results: Results, engine: OpenEngine) -> pl.DataFrame:
 def check_completions(
     run: RunFolder, suite: Suite, completions: Collection[Completion], engine: OpenEngine
 ) -> dict[tuple[str, str], list[str]]:
-    """Check programs, save the results in the run, and return their problems by task and program hash."""
+    """Check programs and save the results in the run. Return the problems by task and program hash."""
     from roboeval.evaluation.generating.checks import check_programs
 
     different = {(one.task, one.program_sha256) for one in completions}

@@ -37,8 +37,7 @@ def find(
 ) -> None:
     """Find completions by what they did, and group the failures.
 
-    A completion is found if its trace satisfies the formula in some world. Failed completions are grouped by
-    the reason.
+    A completion is found if its trace satisfies the formula in some world. Failures are grouped by reason.
     """
     from roboeval.analysis.failure_groups import describe_groups, group_data, group_failures
     from roboeval.analysis.search import TraceQuery, search_row
@@ -91,7 +90,7 @@ def parse_formula(text: str) -> Formula:
 def found_data(
     one: TraceMatch, worlds: Sequence[tuple[int, str]], passed: Container[CompletionKey]
 ) -> dict[str, Any]:
-    """Return a completion with the given worlds as JSON data, for `roboeval find --json`."""
+    """Return a found completion as JSON data: its name, whether it is in `passed`, and the given worlds."""
     from roboeval.evaluation.runs.completions import name_of
 
     return {

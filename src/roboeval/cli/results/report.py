@@ -89,9 +89,9 @@ def report(
 def judged_run(
     results: Results, suite: str, *, beside: str | None, rules: Path | None, engine: OpenEngine | None
 ) -> JudgedRun:
-    """Return a run for a report, with its verdicts from an ablation, the suite `beside` and house rules.
+    """Return a run for a report, with its verdicts in the ablation, in the suite `beside` and under `rules`.
 
-    The engine checks the programs. Without an engine, the report has no results of the check.
+    The engine runs the program check. Without an engine, the report leaves out rejection sampling.
     """
     import polars as pl
 

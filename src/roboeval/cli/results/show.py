@@ -89,7 +89,7 @@ def show(
 
 
 def broken_rules_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ablated: bool) -> BrokenRules:
-    """Count broken house rules in a table, and compare pass@1 with the run's evaluation without rules."""
+    """Count broken house rules in a table. Compare pass@1 with the evaluation without rules, if any."""
     from roboeval.analysis.counting.broken_rules import count_broken_rules
     from roboeval.evaluation.runs.folder import evaluation_key
     from roboeval.evaluation.runs.results import read_results
@@ -103,7 +103,7 @@ def broken_rules_of(run: RunFolder | None, suite: Suite, table: DataFrame, *, ab
 def print_summary(
     counted: EvaluationSummary, *, title: str, as_json: bool, house: BrokenRules | None = None
 ) -> None:
-    """Print the tables of an evaluation under a title, or print its data as JSON."""
+    """Print an evaluation's tables under a title, or its data as JSON. `house` adds broken house rules."""
     from roboeval.analysis.counting.summary import summary_data
     from roboeval.cli.views.results import house_view, summary_view
 
@@ -121,7 +121,7 @@ def print_summary(
 
 
 def show_run(results: Results, k: list[int], *, title: str, has_rules: bool, as_json: bool) -> None:
-    """Print the tables of a whole run with pass@1 and pass@k for each `k`, or print the data as JSON."""
+    """Print a run's tables or JSON: pass@1, pass@k for each `k` and, if `has_rules`, broken house rules."""
     from roboeval.analysis.counting.counts import tally_of
     from roboeval.analysis.counting.summary import summarise
 
@@ -147,7 +147,7 @@ def show_part(results: Results, task: str, prompt: int | None, *, as_json: bool)
 def show_completion(
     judged: Results, key: CompletionKey, *, in_full: bool, with_reply: bool, as_json: bool
 ) -> None:
-    """Print a completion with its program and the reasons for its verdict."""
+    """Print a completion's program and the reasons for its verdict: as `completion_view`, or as JSON."""
     from roboeval.cli.views.completions import completion_view
     from roboeval.evaluation.judging.explanation import completion_data
 

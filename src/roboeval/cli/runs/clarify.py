@@ -41,8 +41,8 @@ def clarify(
 ) -> None:
     """Measure how much one question about candidate programs helps.
 
-    A simulated person chooses among the behaviours of several programs for the same prompt. A run keeps the
-    result for `roboeval report`, unless there are --rules.
+    A simulated person chooses among the behaviours of several programs for the same prompt. If the source is
+    a run, the result is saved in it for `roboeval report`, except with --rules.
     """
     from codebotler.simulator.pool import WorkerPool, cores
     from roboeval.evaluation.clarify import ClarifySettings, clarify, measurement_data, store_measurement
@@ -75,7 +75,7 @@ COLUMNS = {"one": "one program", "majority": "majority", "question": "one questi
 
 
 def clarify_view(data: Mapping[str, Any], title: str, candidates: int) -> RenderableType:
-    """Return a table of pass@1 of one program, of the largest cluster, and with a question, by prompt."""
+    """Return a table of pass@1 by prompt: of one program, the most common behaviour, and after a question."""
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class GenerationRequest:
-    """What a command asks for: which completions to generate, with which model, and in which run folder."""
+    """The parsed options of a command: which completions to generate, with which model, in which folder."""
 
     name: str  # the name of the model
     settings: SamplingSettings
@@ -64,7 +64,7 @@ class GenerationRequest:
         return RunFolder(self.out or Path("runs", f"{folder}-{self.suite}" if fresh else folder))
 
     def open(self) -> Model:
-        """Open the model by its name. It may be a recorded model, which needs no network."""
+        """Open the model by its name. A recorded model replies with stored programs and needs no network."""
         from codebotler.models.open import open_model
         from codebotler.models.recorded import is_recorded
         from roboeval.evaluation.runs.source import recorded_model_for
@@ -145,7 +145,7 @@ def read_options(
 
 
 def complete_run(run: RunFolder, plan: GenerationPlan, model: Model, pace: Pace) -> Path:
-    """Generate the missing completions of a run. Exit with status 1 if any are still missing."""
+    """Generate a run's missing completions, and return its folder. Exit with status 1 if some remain."""
     from codebotler.models.recorded import RECORDED_NOTICE, is_recorded
     from roboeval.evaluation.generating.generate import generate_run
 
@@ -226,7 +226,7 @@ def run(
 ) -> None:
     """Let a model write programs, judge them, and write a report.
 
-    The tables are also printed. If the command is interrupted, the same command continues.
+    The tables are also printed. If the command is interrupted, run it again to continue.
     """
     if with_report and find_spec("matplotlib") is None:  # check this before requests cost money
         fail(f"the report needs matplotlib; {install_command('matplotlib')}, or use --no-report")
@@ -271,7 +271,7 @@ def further_rounds(
     workers: int | None,
     require_isolation: bool,
 ) -> Iterator[Path]:
-    """Regenerate or repair rejected programs in up to `most` rounds, and yield the folder of each round.
+    """Repair (if `repairs`) or regenerate rejected programs in up to `most` rounds; yield each run folder.
 
     The rounds end early if the check accepts all programs. Exit with status 1 if completions are missing.
     """
@@ -296,7 +296,7 @@ def further_rounds(
 
 
 def expect_rounds_fit(plan: GenerationPlan, repair: int, retries: int, *, as_json: bool) -> None:
-    """Exit with status 2 if --repair or --retries is combined with an option that does not allow it."""
+    """Exit with status 2 if --repair or --retries is combined with the other, with --json or with --mode."""
     if repair and retries:
         fail("--repair and --retries cannot be combined; use one of them")
     if as_json and (repair or retries):
@@ -306,7 +306,7 @@ def expect_rounds_fit(plan: GenerationPlan, repair: int, retries: int, *, as_jso
 
 
 class GenerationMeter(ExitStack):
-    """Shows the progress of a run: its completions, its token count and the remaining time."""
+    """Shows the progress of generating a run: completions, tokens and the remaining time."""
 
     progress: GenerationProgress | None = None
 

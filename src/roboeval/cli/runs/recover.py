@@ -35,9 +35,9 @@ def recover(
     json: JsonOption = False,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
-    """Let skill calls fail, and judge how a model continues.
+    """Let skill calls fail, and judge how a model continues missions.
 
-    Each call of the first right program of each task fails once, in each world.
+    For each task, the first right program runs several times in each world. Each time, another call fails.
     """
     from codebotler.core.text.words import counted
     from codebotler.models.open import choose_model, open_model

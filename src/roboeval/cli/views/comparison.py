@@ -32,7 +32,7 @@ def comparison_view(
     runs: Sequence[Results],
     failing: Sequence[Mapping[str, float]],
 ) -> RenderableType:
-    """Return a view of a comparison. `failing` holds each run's share of completions that fail, by class."""
+    """Return a view of a comparison. `failing` has each run's shares of completions by failure class."""
     a, b = map(visible, names)
     rows = grid("left", "right", "left")
     what = "missions that succeed:" if comparison.counts_missions else "pass@1 of"

@@ -33,7 +33,7 @@ SHOWN_REPLY_CHARACTERS = 100_000  # the most characters of a reply or its reason
 
 
 def prompt_view(data: Mapping[str, Any]) -> RenderableType:
-    """Return a view of a prompt's programs and why they fail, given its `prompt_data`."""
+    """Return a view of a prompt's programs and why they fail, from the data that `prompt_data` returns."""
     table = grid("right", "left")
     for program in data["programs"]:
         table.add_row(f"  {program['indices'][0]}", _program_line(program))
@@ -62,7 +62,7 @@ def _program_line(program: Mapping[str, Any]) -> Text:
 def completion_view(
     data: Mapping[str, Any], *, in_full: bool = False, with_reply: bool = False
 ) -> RenderableType:
-    """Return a view of a completion's program and of the robot's steps, given its `completion_data`.
+    """Return a view of a completion's program and of the robot's steps, from the data of `completion_data`.
 
     `in_full` also shows satisfied worlds in full. `with_reply` adds the original reasoning and reply.
     """
@@ -165,7 +165,7 @@ def _ending(world: Mapping[str, Any]) -> Text:
 
 
 def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
-    """Return the lines with the score and the instruction of a prompt."""
+    """Return the lines of text that show a prompt's score and its instruction."""
     score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
     if (prompt["requested"] or 0) > prompt["completions"]:
         score += f"; {prompt['requested']:,} were requested"

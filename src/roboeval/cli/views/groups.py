@@ -32,7 +32,10 @@ def found_view(
     groups: int,
     is_search: bool,
 ) -> RenderableType:
-    """Return a view of the groups `shown`. If `is_search`, it starts with what was found in each task."""
+    """Return a view of the failure groups `shown`. If `is_search`, it starts with the number found by task.
+
+    `found` has the completions found among `total`, `passed` those that passed. There are `groups` in all.
+    """
     failed = sum(one.key not in passed for one in found)
     parts: list[RenderableType] = []
     if is_search:

@@ -103,7 +103,7 @@ def _failure_table(failures: Failures) -> Table:
 
 
 def task_view(data: Mapping[str, Any]) -> RenderableType:
-    """Return a view of the results of each prompt of a task, given its `task_data`."""
+    """Return a view of the results of each prompt of a task, from the data that `task_data` returns."""
     task = data["task"]
     models = {model for prompt in data["prompts"] for model in prompt["models"]}
     parts: list[RenderableType] = [Text(visible(task) + recorded_suffix(models), style="bold")]

@@ -15,7 +15,7 @@ from roboeval.suites.task import describe_contents, world_title
 
 
 def suite_view(suite: Suite) -> RenderableType:
-    """Return a table of a suite's tasks for the terminal, one per row."""
+    """Return a table for the terminal with one row for each task of a suite."""
     table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
     table.add_column("task", no_wrap=True)
     table.add_column("worlds", justify="right")

@@ -43,7 +43,7 @@ DARK_CELL_SHARE = 0.75  # cells with a larger share have white text
 
 
 def draw_overall(runs: Sequence[JudgedRun]) -> Figure:
-    """Draw the mean pass@1 of each run with its interval over tasks."""
+    """Draw a bar for each run: its mean pass@1, with a 95% confidence interval over tasks."""
     figure = new_figure(PAGE_WIDTH, 0.62 + 0.21 * len(runs))
     axes = figure.add_subplot()
     for at, run in enumerate(runs):
@@ -69,7 +69,7 @@ def _whisker(cap: float) -> dict[str, Any]:
 
 
 def draw_task_scores(runs: Sequence[JudgedRun]) -> Figure:
-    """Draw pass@1 by task and run, with intervals. A second panel shows common-sense results, if any."""
+    """Draw bars of pass@1 by task and run. A second panel shows pass@1 by common sense only, if judged."""
     tasks = tasks_of(runs)
     judged = {score.task for run in runs for score in run.ablated_scores}
     ablated = [task for task in runs[0].suite.tasks if task in judged]
@@ -171,7 +171,7 @@ def draw_heat_map(
 
 
 def draw_causes(found: Sequence[tuple[str, Causes]]) -> Figure:
-    """Draw how often each outcome occurs in each named run, and the kinds of failure in each class."""
+    """Draw the outcomes of runs and the kinds of failure in each class, given pairs of a name and causes."""
     happened = {name for _, one in found for name, share in one.classes.items() if share}
     shown = classes_to_show(happened)
     kinds = {name: kinds_in_order([one for _, one in found], name) for name in shown}

@@ -98,7 +98,7 @@ def _threshold_labels(axes: Axes) -> None:
 
 
 def draw_limits(curves: Mapping[str, Mapping[int, Points]], most: int) -> Figure:
-    """Draw the share of prompts that reach each pass@1, down to 1 / `most`, by run and limit on retries."""
+    """Draw the share of prompts that reach each pass@1 from 1 to 1 / `most`, by run and limit on retries."""
     columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3)
     rows = math.ceil(len(curves) / columns)
     figure = new_figure(PAGE_WIDTH if columns > 1 else COLUMN_WIDTH, 1.75 * rows + 0.55)

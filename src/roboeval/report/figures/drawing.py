@@ -41,7 +41,7 @@ FIGURE_STYLE: dict[Any, Any] = {
 
 @contextmanager
 def use_style() -> Iterator[None]:
-    """Apply the style of reports instead of the user's matplotlib settings."""
+    """In the `with` block, draw in the style of reports instead of the user's matplotlib settings."""
     with warnings.catch_warnings(), mpl.rc_context():
         warnings.simplefilter("ignore")  # names may contain characters that the font lacks
         mpl.rcdefaults()
@@ -55,7 +55,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def render(figure: Figure) -> dict[str, bytes]:
-    """Return the content of a figure's files by ending (`png`, `pdf`, `svg`), without dates or versions."""
+    """Return a figure as bytes by file ending (`png`, `pdf`, `svg`). Equal figures give equal bytes."""
     if (layout := figure.get_layout_engine()) is not None:
         layout.execute(figure)
         figure.set_layout_engine(None)
@@ -68,7 +68,7 @@ def render(figure: Figure) -> dict[str, bytes]:
 
 
 def shades() -> LinearSegmentedColormap:
-    """Return the colour map for shares from 0 to 1."""
+    """Return the colour map for shares, from white for 0 to dark blue for 1."""
     return LinearSegmentedColormap.from_list("shades", [BACKGROUND, MIDDLE_SHADE, DARKEST_SHADE])
 
 

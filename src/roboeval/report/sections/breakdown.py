@@ -25,7 +25,7 @@ MAX_DISTINCT_WORDS = 12
 
 
 def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of pass@1 and causes of failures for the tasks of each ability, such as perception."""
+    """Build the table of pass@1 and causes of failures by the ability that tasks need, such as perception."""
     tasks = runs[0].suite.tasks
     found: list[tuple[list[Cell], dict[str, float]]] = []
     for ability in dict.fromkeys(ability for task in tasks.values() for ability in task.abilities):
@@ -45,7 +45,7 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of pass rates and failures of tasks where the robot must report back, and of others."""
+    """Build the table that compares tasks in which the robot must come back and report with all others."""
     reporting = {one.name for one in runs[0].suite.tasks.values() if REPORT_ABILITY in one.abilities}
     rows: list[list[Cell]] = []
     for run in runs:
@@ -66,7 +66,7 @@ def report_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def never_returned(row: Row) -> bool:
-    """Whether the robot left its starting room for good in the failing world. False if this is unknown."""
+    """Whether, in the failing world, the robot left its first room and did not return. False if unknown."""
     verdict = row["verdicts"][failure_of(row)["world"]]
     if "cut" in verdict:
         return False
@@ -81,10 +81,7 @@ def never_returned(row: Row) -> bool:
 
 
 def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of the best and worst prompt of each task and run, largest difference first.
-
-    If several prompts are equally good or bad, the first of them is shown.
-    """
+    """Build the table of the best and worst prompt of each task and run, largest difference first."""
     rows: list[list[Any]] = []
     for run in runs:
         for score in run.scores:
@@ -98,7 +95,7 @@ def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def distinct_words(one: str | None, other: str | None) -> tuple[str, str]:
-    """Return the words only in the first text, and those only in the second, or a note if one is None."""
+    """Return the words that are only in the first text and only in the second, or notes if a text is None."""
     if one is None or other is None:
         return NO_INSTRUCTION, NO_INSTRUCTION
     words = (re.findall(r"[^\W_]+(?:['\u2019][^\W_]+)*", text.lower()) for text in (one, other))
@@ -112,9 +109,9 @@ def _join(words: Sequence[str]) -> str:
 
 
 def phrasing_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table that compares each prompt with the mean of its task, most harmful prompts first.
+    """Build the table that compares each prompt with the mean of its task, worst prompts first.
 
-    It covers tasks with several prompts. A prompt hurts a run if it is worse than the mean.
+    It covers tasks with several prompts, and counts the runs in which a prompt is below the mean.
     """
     better: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
     for score in chain.from_iterable(run.scores for run in runs):

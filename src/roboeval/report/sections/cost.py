@@ -63,7 +63,7 @@ def retry_curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float
 
 
 class RunCost(NamedTuple):
-    """The cost of completions in total and per passing program. Values that were not recorded are None."""
+    """The tokens, seconds and money that a run's completions took. Values that were not recorded are None."""
 
     completions: int
     passed: int
@@ -78,7 +78,7 @@ class RunCost(NamedTuple):
 
 
 def cost_of(run: JudgedRun) -> RunCost:
-    """Add up the tokens, seconds and money that a run's completions took, in total and per passing one."""
+    """Add up the tokens, seconds and money that completions took, in total and per passing completion."""
     completions, price = run.completions, run.price
     passed = int(completions["passed"].sum())
     sent, received = _tokens(completions)
@@ -100,7 +100,7 @@ def _tokens(completions: pl.DataFrame) -> tuple[int, int] | tuple[None, None]:
 
 
 def cost_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of each run's cost, in total and per passing program."""
+    """Build the table of each run's cost, in total and per passing program. It omits runs of unknown cost."""
     found = [(run.name, cost_of(run)) for run in runs]
     known = [one for one in found if one[1].input_tokens is not None or one[1].seconds is not None]
     return sheet("cost", [[name, *one] for name, one in known])
@@ -119,7 +119,7 @@ def cost_sentence(run: JudgedRun) -> str:
 
 
 class Budget(NamedTuple):
-    """How many passing programs a budget buys if programs that the check rejects are requested again."""
+    """The number of passing programs per request, token and unit of money, for one limit on retries."""
 
     retries: int
     requests: float  # mean number per program

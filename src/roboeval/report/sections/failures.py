@@ -26,7 +26,7 @@ MAX_GROUPS_SHOWN = 200  # number of groups on the page
 
 
 def causes_section(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
-    """Build the section on causes of failures, optionally with those published (paper, section V.B)."""
+    """Build the section on causes of failures. `with_published` adds those in the paper (section V.B)."""
     drawn, left_out = runs_to_draw(runs)
     shown = all_causes(drawn, with_published=with_published)
     figure = ReportFigure("causes", lambda: figures.draw_causes(shown), [*coverage_of(runs), *left_out])
@@ -35,7 +35,7 @@ def causes_section(runs: Sequence[JudgedRun], *, with_published: bool) -> Sectio
 
 
 def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple[str, Causes]]:
-    """Collect the causes of each run, followed by the published causes if requested and available."""
+    """Pair each run's name with its causes of failures. `with_published` adds those in the paper, if any."""
     found: list[tuple[str, Causes]] = []
     for run in runs:
         found.append((run.name, causes(tally_of(run.table))))
@@ -54,7 +54,7 @@ def most_frequent(run: JudgedRun) -> str:
 
 
 def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
-    """Build the table of all causes with their counts and shares, given the causes of each named run."""
+    """Build the table of causes with their counts and shares, given pairs of a run's name and its causes."""
     rows = [
         [name, cause, kind, one.counts.get((cause, kind)), share]
         for name, one in found
@@ -65,7 +65,7 @@ def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
 
 
 def published_notes(runs: Sequence[JudgedRun]) -> list[str]:
-    """Describe the limitations of comparing runs with published causes."""
+    """Return notes on how far the causes of failures of these runs compare with the published ones."""
     known = [run for run in runs if paper.model_of(run) is not None]
     if not known:
         return ["None of these runs uses a model of the paper, so no published causes are shown."]

@@ -16,7 +16,7 @@ from roboeval.report.sheets import Cell, Sheet, sheet
 
 
 def mode_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of success and cost per mission of each run. It is empty if no run has an agent."""
+    """Build the table of success and cost per mission of each run. Empty if no run has agents' missions."""
     rows: list[list[Cell]] = []
     for run in runs if any(has_missions(run.table) for run in runs) else ():
         completions, missions = run.completions, per_mission(_table(run))

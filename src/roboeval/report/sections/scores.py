@@ -78,14 +78,14 @@ def _task_row(run: JudgedRun, score: TaskScore, what: str) -> list[Cell]:
 
 
 def thresholds_section(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section on the share of prompts that reach each pass@1 (paper, section V.A)."""
+    """Build the section on how many prompts have a pass@1 of at least x, for each x (paper, section V.A)."""
     drawn, left_out = runs_to_draw(runs)
     figure = ReportFigure("thresholds", lambda: draw_thresholds(drawn), left_out)
     return section("thresholds", figure, curve_sheet(runs))
 
 
 def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of the share of prompts that reach each pass@1."""
+    """Build the table of the share of prompts with a pass@1 of at least x, for each x and run."""
     curves = [[*run.by_prompt.values()] for run in runs]
     steps = sorted({t for values in curves for t, _ in threshold_curve(values)}, reverse=True)
     rows = [[t, *(share_at_least(values, t) for values in curves)] for t in steps]
@@ -93,7 +93,7 @@ def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def differences_section(runs: Sequence[JudgedRun]) -> Section:
-    """Build the section that compares runs in pairs. If there are many, it compares each with the best."""
+    """Build the section that compares runs in pairs or, with more than 10 pairs, each run with the best."""
     rows: list[list[Cell]] = []
     sentences: list[str] = []
     notes: list[str] = []
@@ -119,7 +119,7 @@ def differences_section(runs: Sequence[JudgedRun]) -> Section:
 
 
 def leader_sentences(runs: Sequence[JudgedRun]) -> list[str]:
-    """Return a sentence that compares the two best runs, or an empty list if they cannot be compared."""
+    """Return a list with a sentence that compares the two best runs. Empty if they cannot be compared."""
     if len(runs) == 1:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)
@@ -130,7 +130,7 @@ def leader_sentences(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def prompt_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of pass@1 by task and prompt, with published values for the same prompts."""
+    """Build the table of pass@1 by task and prompt, with the published values of the paper's prompts."""
     imported = [run for run in runs if paper.uses_authors_prompts(run)]
     theirs = {run.name: model for run in imported if (model := paper.model_of(run)) is not None}
     heads = [[run.name, *([f"{run.name}, published"] if run.name in theirs else [])] for run in runs]

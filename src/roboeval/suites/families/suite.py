@@ -27,10 +27,10 @@ FAMILY_SUITE_NAME = re.compile(r"families-([a-z]+)-(\d{1,9})(?:-(\d{1,3}))?", re
 
 
 def first_seed(split: str, seed: int, count: int, what: str) -> int:
-    """Return the first of `count` consecutive seeds of a split, such as 30 for `train`, seed 3 and count 10.
+    """Return the first seed of block number `seed` of a split, such as 30 for `train`, seed 3 and count 10.
 
-    With the same count, the results for different values of `seed` do not overlap. Raises UserError if the
-    split does not exist or a number is out of range. The message calls the counted items `what`.
+    Blocks contain `count` seeds and do not overlap. Raises UserError if the split does not exist or a number
+    is out of range. The message calls the counted items `what`, such as `task`.
     """
     if split not in FIRST_SEEDS:
         raise UserError(f'unknown split "{split}"; use {listed(list(FIRST_SEEDS))}')
@@ -44,7 +44,7 @@ def first_seed(split: str, seed: int, count: int, what: str) -> int:
 
 @dataclass(frozen=True)
 class FamilyTasks:
-    """Selects the generated tasks of a suite, one from each family in turn.
+    """Selects generated tasks for a suite, one from each family (task template) in turn.
 
     Args:
         split: `train`, `validation` or `test`, which have no task in common.
@@ -82,7 +82,7 @@ class FamilyTasks:
 
 
 def family_tasks_named(name: str) -> FamilyTasks | None:
-    """Parse a name such as `families-test-7`, or return None. Raise UserError if a part of it is wrong."""
+    """Parse a name such as `families-test-7`; None for others. Raise UserError if a part is not valid."""
     match = FAMILY_SUITE_NAME.fullmatch(name)
     if match is None:
         return None

@@ -50,7 +50,7 @@ Choice: TypeAlias = Name | Annotated[list[Name], Field(min_length=1)]
 
 
 class WrongProgram(StrictForm):
-    """A program that does not do everything that was asked."""
+    """A program that does not do everything that was asked, and a description of its mistake."""
 
     about: Name
     program: YamlText
@@ -86,7 +86,7 @@ class GeneratedTask:
 
     @property
     def prompts(self) -> tuple[str, ...]:
-        """Return the phrasings of the instruction."""
+        """Return the phrasings of the task's instruction."""
         return self.suite.tasks[self.name].prompts
 
     def expect_prompt(self, index: int) -> None:
@@ -102,7 +102,7 @@ def family_names() -> tuple[str, ...]:
 
 
 def family_file(family: str) -> Path:
-    """Return the file of a family, given its name or the file's path. Raise UserError if there is none."""
+    """Return the file of a family, given its name or a path. Raise UserError if there is no such file."""
     if family.endswith(".yaml") and Path(family).is_file():
         return Path(family)
     if family not in family_names():
@@ -111,7 +111,7 @@ def family_file(family: str) -> Path:
 
 
 def trained_task(family: str, seed: int, *, worlds: int = TRAINING_WORLDS) -> GeneratedTask:
-    """Generate the task of a family for a seed. Equal arguments give equal tasks.
+    """Generate a training task from a family (a template) for a seed. Equal arguments give equal tasks.
 
     Args:
         family: one of `family_names()`, or the path of a `.yaml` file, which is read only once.

@@ -62,7 +62,7 @@ def parse_cached(text: str) -> ast.expr:
 
 
 def evaluate(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - strings, numbers, lists of them
-    """Compute the value of an expression, given values of names. Raise ExpressionError if that fails."""
+    """Compute the value of an expression, given the values of names. Raise ExpressionError if impossible."""
     try:
         return _checked_value(node, names)
     except ExpressionError:
@@ -140,7 +140,7 @@ def _compute(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR091
 
 
 def iterate_loop(loop: ast.comprehension, names: Names) -> Iterator[Names]:
-    """Yield `names` with the loop variable, for each iteration of a loop like `for p in people if p.room`."""
+    """Yield `names` plus the loop variable for each iteration of a loop like `for p in people if p.room`."""
     if not isinstance(loop.target, ast.Name) or loop.is_async:
         raise ExpressionError(f'"{ast.unparse(loop.target)}" is not a single name; write for NAME in ...')
     items = _checked_value(loop.iter, names)

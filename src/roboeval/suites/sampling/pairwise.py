@@ -15,7 +15,7 @@ _TRIES = 12  # number of candidates tried for each combination
 
 
 def number_values(sizes: Mapping[str, int]) -> dict[str, range]:
-    """Number the values of all factors: for a=2 and b=3, a has the numbers 0 and 1, and b has 2 to 4."""
+    """Number the values of all factors: if a has 2 values and b has 3, a gets 0 and 1, and b gets 2 to 4."""
     numbers: dict[str, range] = {}
     start = 0
     for factor in sorted(sizes):
@@ -25,7 +25,7 @@ def number_values(sizes: Mapping[str, int]) -> dict[str, range]:
 
 
 def sample_combinations(sizes: Mapping[str, int], count: int, random: Random) -> list[Combination]:
-    """Return combinations that cover all pairs of values, then random ones until there are `count`."""
+    """Return combinations that cover all pairs of values, and random ones if these are fewer than `count`."""
     rows = cover_pairs(sizes, random)
     rows += [{name: random.randrange(size) for name, size in sizes.items()} for _ in range(count - len(rows))]
     return rows

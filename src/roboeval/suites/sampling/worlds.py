@@ -90,9 +90,9 @@ class WorldSampler:
         return _levels(where)
 
     def settings(self, count: int, seed: int) -> Iterator[Setting]:
-        """Yield the corners (worlds set by hand), then random worlds that cover all pairs of factors' values.
+        """Yield the corners (worlds set by hand), then random worlds that cover all pairs of values.
 
-        There are at least `count` worlds, unless fewer different ones are found.
+        There are at least `count` worlds, or fewer if not enough different worlds can be found.
         """
         random = Random(f"{self.form.name} {seed}")  # noqa: S311 - not for cryptography
         corners = [self._corner(corner, number) for number, corner in enumerate(self.form.worlds.corners)]
@@ -157,7 +157,7 @@ class WorldSampler:
         return World(tuple(rooms), setting.start, setting.about, wait)
 
     def requirements(self, setting: Setting) -> Iterator[tuple[str, int]]:
-        """Yield each requirement of a world as text, with the index of its entry under `require`."""
+        """Yield each requirement of a world as text, with the index of its entry in the list `require`."""
         names = self._names(setting)
         for number, form in enumerate(self.form.require):
             with self._located("require", number):
