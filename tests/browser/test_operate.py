@@ -184,6 +184,30 @@ def test_only_what_this_browser_shows_is_approved(server: PageServer, open_page:
     expect(page.locator(".cm-content")).not_to_contain_text("something else")
 
 
+def test_a_click_on_a_stalled_connection_approves_only_what_it_was_made_for(
+    server: PageServer, open_page: OpenPage
+) -> None:
+    page = open_page(server)
+    type_and_check(page, TEA)
+    button = page.get_by_role("button", name="Run it on the robot")
+    expect(button).to_be_enabled()
+    page.evaluate("""() => {
+        const connection = window.socket.io.engine.transport.ws;
+        const [receive, held] = [connection.onmessage, []];
+        connection.onmessage = (message) => held.push(message);
+        window.release = () => { connection.onmessage = receive; held.forEach((each) => receive(each)); };
+    }""")
+    server.call("POST", "/api/missions", {"program": FAR})
+    wait_until(page, "fetch('api/missions/current').then(a => a.json()).then(a => a.state === 'checked')")
+    page.wait_for_timeout(2_000)
+    button.click()
+    page.wait_for_timeout(500)
+    page.evaluate("release()")
+    expect(page.get_by_text("review it again")).to_be_visible()
+    expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
+    expect(page.locator(".cm-content")).to_contain_text("range(50)")
+
+
 def test_checks_keep_text_that_is_typed_meanwhile(server: PageServer, open_page: OpenPage) -> None:
     page = open_page(server)
     write(page, TEA)
@@ -400,6 +424,17 @@ def test_unreachable_tool_is_reported(server: PageServer, open_page: OpenPage) -
     page.route("**/api/stop*", lambda route: route.fulfill(body="lost"))
     page.locator("#stop").click()
     expect(page.locator("#stop-told")).to_contain_text("emergency stop")
+
+
+def test_stop_that_is_not_answered_for_seconds_is_reported(server: PageServer, open_page: OpenPage) -> None:
+    page = open_page(server)
+    held: list[Route] = []
+    page.route("**/api/stop*", lambda route: held.insert(0, route))
+    page.locator("#stop").click()
+    expect(page.locator("#stop-told")).to_have_text("Sending the stop …")
+    expect(page.locator("#stop-told")).to_contain_text("emergency stop")
+    held[0].continue_()
+    expect(page.locator("#stop-told")).to_have_text("Nothing is running.")
 
 
 def test_stop_is_always_in_the_same_place_and_nothing_is_wider_than_the_screen(

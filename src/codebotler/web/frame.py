@@ -14,6 +14,7 @@ from fastapi import FastAPI
 from nicegui import html, ui
 from nicegui.element import Element
 from nicegui.elements.mixins.text_element import TextElement
+from nicegui.events import GenericEventArguments
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, visible_lines
@@ -122,18 +123,21 @@ def warned() -> Iterator[None]:
 
 
 class Button(PlainText):
-    """A button that calls a function. A mistake of the user is shown as a warning."""
+    """A button that calls a function, with the value of the JavaScript expression `emits` if there is one.
 
-    def __init__(self, text: str, pressed: Callable[[], Any], kind: str = "") -> None:
-        async def press() -> None:
+    A mistake of the user is shown as a warning.
+    """
+
+    def __init__(self, text: str, pressed: Callable[..., Any], kind: str = "", *, emits: str = "") -> None:
+        async def press(event: GenericEventArguments) -> None:
             with warned():
-                result = pressed()
+                result = pressed(event.args) if emits else pressed()
                 if iscoroutine(result):  # a dialog could be awaited, too, and would open again
                     await result
 
         super().__init__("button", text, kind)
         self.props("type=button")
-        self.on("click", press)
+        self.on("click", press, js_handler=f"() => emit({emits})")
 
     def allow(self, may: bool) -> None:  # noqa: FBT001 - the only argument
         """Enable or disable the button."""

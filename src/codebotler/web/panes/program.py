@@ -70,7 +70,7 @@ class ProgramPane:
             self._approval = ui.element("div").classes("word")
             with self._approval:
                 self._despite = ui.checkbox("Run it despite the problems", on_change=self._ticked)
-                self._run = Button("Run it on the robot", self._approve, "go")
+                self._run = Button("Run it on the robot", self._approve, "go", emits="programEditor.settle()")
                 self._raise = Button("", self._raise_limit, "plain")
                 self._repair = Button("Repair", lambda: self._again(repair=True), "plain")
                 self._again_button = Button("Ask again", lambda: self._again(repair=False), "plain")
@@ -120,6 +120,7 @@ class ProgramPane:
             ],
             "editable": view.may_be_edited,
             "received": self._received,
+            "approval": _approval(view),
             "force": force,
         }
         if content != self._sent or force:
@@ -192,29 +193,22 @@ class ProgramPane:
         look = "plain" if is_unfinished(view) else "go risky" if view.problems else "go"
         self._run.classes(add=look, remove="plain go risky")
 
-    async def _approve(self) -> None:
+    async def _approve(self, seen: dict[str, object]) -> None:
+        """Approve the program that the browser showed at the click, which may come late, or refuse."""
         session, view = self._console.session, self._view
+        program, is_reviewed = _for_editor(view.program), time.monotonic() >= self._review_until
         if self._may_rerun(view):
             self._console.edit(view.program)
-        elif time.monotonic() < self._review_until:
-            warn("The program has changed; review it again.")
-        elif session is not None and await self._is_seen(view):
-            despite = bool(self._despite.value)
+        elif session and is_reviewed and seen == {"text": program, "approval": _approval(view)}:
+            despite, rules = bool(self._despite.value), view.disabled_rules
             await asyncio.to_thread(
-                session.approve, view.digest, despite_problems=despite, disabled_rules=view.disabled_rules
+                session.approve, view.digest, despite_problems=despite, disabled_rules=rules
             )
             scroll_up()
-
-    async def _is_seen(self, view: SessionView) -> bool:
-        """Whether this browser shows exactly the view's program, since two people may type at once."""
-        seen = await ui.run_javascript("programEditor.settle()", timeout=5.0)
-        if seen["text"] == _for_editor(view.program):
-            return True
-        if seen["number"] > self._received or seen["text"] == _for_editor(self._console.view.program):
+        elif is_reviewed and seen["text"] == program:
             ui.notify("Checking your last edit first.", position="bottom")
         else:
             self._restore("The program has changed; review it again.")
-        return False
 
     def _again(self, *, repair: bool, max_tokens: int | None = None) -> None:
         session = self._console.session
@@ -241,6 +235,11 @@ def storyboard_of(view: SessionView, check: CheckResult) -> Storyboard:
     if view.is_over and view.state in EARLY_ENDS:
         end = "failed" if view.state is MissionState.FAILED else "stopped"
     return Storyboard(check, storyboard_title(view), visited, view.progress.learned, end)
+
+
+def _approval(view: SessionView) -> list[object]:
+    """Return what a click on a page that shows this view approves."""
+    return [view.number, view.digest, *view.disabled_rules]
 
 
 def _author_text(view: SessionView) -> str:

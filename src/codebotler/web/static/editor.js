@@ -56,10 +56,10 @@ def task_program():
     editor.emitting = true;
   };
 
-  /** Send pending text at once, and return the shown text and the number of texts sent. */
+  /** Send pending text at once, and return what the page shows. */
   const settle = () => {
     if (waiting !== undefined) send();
-    return { text: text(), number: sent };
+    return { text: editor && text(), approval: latest?.approval };
   };
 
   const show = (state) => {

@@ -16,6 +16,8 @@
     null: "Stopped before the mission started.",
   };
   const SHOWN = 8000; // ms
+  const PATIENCE = 3000; // ms until the page says that the stop has not been answered
+  const LONGEST_POLL = 20_000; // ms, more than the server waits before it answers
   class Refused extends Error {}
   let pressed = 0;
   let showsOutcome = false; // whether the text is about a mission that is over
@@ -26,7 +28,8 @@
     output.className = kind;
   };
 
-  const ask = async (wait) => (await fetch(`${robotAt}?once=${wait}`)).json();
+  const ask = async (wait) =>
+    (await fetch(`${robotAt}?once=${wait}`, { signal: AbortSignal.timeout(LONGEST_POLL) })).json();
 
   const watch = async (which) => {
     for (;;) {
@@ -45,19 +48,22 @@
   const stop = async (onlyMoving) => {
     const which = ++pressed;
     if (!onlyMoving) say("Sending the stop …", "busy");
+    const late = setTimeout(() => which === pressed && say(LOST, "bad"), PATIENCE);
     try {
       const answer = await fetch(`${stopAt}?only_moving=${onlyMoving}`, { method: "POST" });
       const { stopping, warning, detail } = await answer.json();
+      clearTimeout(late);
       if (!answer.ok) throw new Refused(detail);
       if (warning) {
         say(UNSURE, "bad");
       } else if (stopping) {
         say("Stop sent. Waiting for the robot to confirm …", "busy");
         await watch(which);
-      } else if (!onlyMoving) {
+      } else if (!onlyMoving || output.textContent === LOST) {
         say("Nothing is running.", "", true);
       }
     } catch (error) {
+      clearTimeout(late);
       say(error instanceof Refused ? `${REFUSED} (${error.message})` : LOST, "bad");
     }
     const lasts = () => output.classList.contains("bad") && output.textContent !== UNSURE; // the page warns, too
