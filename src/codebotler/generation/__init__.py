@@ -1,4 +1,1 @@
-"""Generate programs from instructions.
-
-Start with `generate.py`.
-"""
+"""Generate programs from instructions. Start with `generate.py`."""

@@ -123,10 +123,7 @@ def warned() -> Iterator[None]:
 
 
 class Button(PlainText):
-    """A button that calls a function, with the value of the JavaScript expression `emits` if there is one.
-
-    A mistake of the user is shown as a warning.
-    """
+    """A button that calls `pressed`, with the value of the JavaScript `emits` if any. It shows mistakes."""
 
     def __init__(self, text: str, pressed: Callable[..., Any], kind: str = "", *, emits: str = "") -> None:
         async def press(event: GenericEventArguments) -> None:
