@@ -29,7 +29,7 @@ AgentContext: TypeAlias = Context[Gatekeeper, Any]
 
 
 class NotAsked(BaseModel):
-    """The result if no dialog was shown, for example because the client has none."""
+    """The answer if no dialog was shown to the person, for example because the client has no dialogs."""
 
 
 class Consent(BaseModel):
@@ -48,7 +48,7 @@ class Choice(BaseModel):
 
 
 class StepWord(BaseModel):
-    """The dialog in which a person says whether a step happened, if the log does not say so."""
+    """The dialog in which a person says whether a step happened, because the log does not show it."""
 
     answer: Literal["it happened", "it did not happen"] = Field(title="Did this happen?")
 
@@ -57,7 +57,7 @@ class StepWord(BaseModel):
 
 
 class OpenQuestion(NamedTuple):
-    """A mission that waits until a person chooses a behaviour, and the question about it."""
+    """A mission that waits until a person chooses a behaviour, and the question with the choices."""
 
     session: MissionSession
     asked: ClarifyingQuestion
@@ -77,14 +77,14 @@ async def find_question(ctx: AgentContext) -> OpenQuestion:
 def ask_which_behaviour(
     question: Annotated[OpenQuestion, Resolve(find_question)], ctx: AgentContext
 ) -> Elicit[Choice] | NotAsked:
-    """Have the client ask its person for a behaviour, or return NotAsked if the client has no dialogs."""
+    """Return the dialog to choose a behaviour, or NotAsked if the client may not or cannot show dialogs."""
     if not gatekeeper_of(ctx).asks_client or not _has_dialogs(ctx):
         return NotAsked()
     return Elicit(f"Mission {question.session.view.id}: {choice_text(question.asked)}", Choice)
 
 
 async def read_last_past(ctx: AgentContext) -> MissionPast:
-    """Return what the last mission did and saw. During a continuation, return what that continues."""
+    """Return what the mission to continue did: the last one, or the one that is being continued now."""
     gatekeeper, console = gatekeeper_of(ctx), gatekeeper_of(ctx).console
     with as_tool_errors():
         if console.view.past is not None and not console.view.is_over:
@@ -95,7 +95,7 @@ async def read_last_past(ctx: AgentContext) -> MissionPast:
 def ask_whether(
     past: Annotated[MissionPast, Resolve(read_last_past)], ctx: AgentContext
 ) -> Elicit[StepWord] | NotAsked:
-    """Have the client ask its person whether a step happened if the log does not say so."""
+    """Return a dialog that asks whether a step happened, or NotAsked if this is known or cannot be asked."""
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NotAsked()
@@ -107,7 +107,7 @@ AFTER_HOLD = "After a STOP or a lost robot, your yes also lets agents act within
 
 
 class ProposedProgram(NamedTuple):
-    """A mission to approve, with the problems and switched-off rules that the person sees."""
+    """A mission to approve, with the problems and switched-off house rules that the person is shown."""
 
     session: MissionSession
     problems: tuple[str, ...]
@@ -115,7 +115,7 @@ class ProposedProgram(NamedTuple):
 
 
 async def find_proposed(digest: str, ctx: AgentContext) -> ProposedProgram:
-    """Return the current mission and its problems. Raise ToolError if its program has another digest."""
+    """Return the mission to approve. Raise ToolError if the current mission does not have this digest."""
     with as_tool_errors():
         session = gatekeeper_of(ctx).find_session(digest)
     view = session.view
@@ -125,7 +125,7 @@ async def find_proposed(digest: str, ctx: AgentContext) -> ProposedProgram:
 def ask_person(
     proposed: Annotated[ProposedProgram, Resolve(find_proposed)], ctx: AgentContext
 ) -> Elicit[Consent] | NotAsked:
-    """Have the client ask its person for approval, or return NotAsked if that is needless or impossible."""
+    """Return the dialog to approve a program, or NotAsked if it is not needed or cannot be shown."""
     gatekeeper, session = gatekeeper_of(ctx), proposed.session
     view = session.view
     may_ask = view.may_be_approved and gatekeeper.may_ask_client(view) and _has_dialogs(ctx)
@@ -146,7 +146,7 @@ def gatekeeper_of(ctx: AgentContext) -> Gatekeeper:
 
 
 def agent_name(ctx: AgentContext) -> str:
-    """Return the agent's name for logs, such as `agent "claude-code"`. Its client gives it."""
+    """Return an agent's name for logs, such as `agent "claude-code"`; `an agent` if its client gives none."""
     known = ctx.session.client_params
     if known is None:
         return "an agent"
@@ -162,7 +162,7 @@ def _has_dialogs(ctx: AgentContext) -> bool:
 
 @contextmanager
 def as_tool_errors() -> Iterator[None]:
-    """Convert an error of the block to a ToolError, so that the agent reads its sentence."""
+    """In a `with` block, turn our own errors into a ToolError, whose sentence the agent can read."""
     try:
         yield
     except (UserError, MissionError, ModelError) as error:

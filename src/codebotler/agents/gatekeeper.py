@@ -50,7 +50,7 @@ class Gatekeeper:
 
     Args:
         console: the robot and its current mission.
-        asks_client: whether a client may ask its person, in a dialog that its agent cannot answer.
+        asks_client: whether clients may show their dialogs, because only a person can answer them.
         writes: whether a model is configured that can write programs.
         page: the address of the page, without its token; empty before it is served.
     """
@@ -66,7 +66,10 @@ class Gatekeeper:
     _under_way: set[str] = field(default_factory=set, init=False)  # what threads do for agents
 
     def propose(self, order: MissionOrder, steps: Steps | None = None) -> MissionSession:
-        """Begin a mission that waits for approval. Raise MissionError if the console is busy with another."""
+        """Begin a mission that waits for approval. Raise MissionError while a person works on another one.
+
+        `steps` belongs to a step-by-step mission; None for a mission with a program.
+        """
         before = self.console.session
         view = SessionView() if before is None else before.view
         is_own = before is None or (before is self._session and not before.is_changed_by_person)
@@ -83,7 +86,7 @@ class Gatekeeper:
     def propose_steps(
         self, purpose: str, bounds: Mapping[str, Any], author: str
     ) -> tuple[MissionSession, Steps]:
-        """Propose a step-by-step mission. `bounds` is its contract as data, and `author` the agent's name."""
+        """Propose a step-by-step mission of the agent `author`, with the contract `bounds` as plain data."""
         if self.console.view.is_running:  # before the bounds are read, which takes time
             raise MissionError("a mission is running; wait until it is over, or stop it")
         if len(json.dumps(bounds)) > MAX_CONTRACT_CHARACTERS:
@@ -105,28 +108,28 @@ class Gatekeeper:
             why = f"; mission {view.id} is {view.phase}" if view.id else view.error and f"; {view.error}"
             raise MissionError(f"no mission is waiting or running{why}; propose one")
         if session.view.digest != digest:
-            raise MissionError("the current mission has another program; follow_mission shows its digest")
+            raise MissionError("the current mission has another digest; call follow_mission to see it")
         return session
 
     def find_steps(self, key: str) -> tuple[MissionSession, Steps]:
         """Return the running step-by-step mission with this key, or else raise MissionError."""
         steps, session = self._steps, self._session
         if steps is None or session is None or not compare_digest(steps.key.encode(), key.encode()):
-            raise MissionError("there is no step-by-step mission with this key; begin_steps begins one")
+            raise MissionError("no step-by-step mission has this key; call begin_steps to propose one")
         if not self.takes_steps(session):
             raise MissionError(NOT_RUNNING)
         return session, steps
 
     def takes_steps(self, session: MissionSession) -> bool:
-        """Whether a session runs an agent's steps now, rather than a program that a person wrote instead."""
+        """Whether an agent can call skills in a session now. False if a person has replaced its program."""
         steps, view = self._steps, session.view
         is_running = view.state is MissionState.RUNNING and session is self._session
         return is_running and steps is not None and view.program == steps.program
 
     def approves_alone(self, session: MissionSession) -> bool:
-        """Whether a mission needs no person's approval, because the contract given at the start allows it.
+        """Whether the contract given at the start allows a mission, so that no person has to approve it.
 
-        If a person has changed the program, switched off a rule or pressed STOP, a person must approve it.
+        False after a STOP, if the check found problems, or if a person has changed the program or its rules.
         """
         view = session.view
         if self.console.is_held:
@@ -136,14 +139,14 @@ class Gatekeeper:
         return is_agents and is_within and view.may_be_approved and not view.problems
 
     def contract_text(self, contract: Contract | None) -> str:
-        """Return sentences that say what a program can do at most, or "" if there is no contract."""
+        """Return a contract in sentences, or "" if there is no contract."""
         if contract is None:
             return ""
         whole = partial(brief_part, most=MAX_PROGRAM_LENGTH)
         return contract_sentence(contract, self.console.robot.skills, whole, is_short=False)
 
     def may_ask_client(self, view: SessionView) -> bool:
-        """Whether clients may open a dialog to approve a program that can run and is short enough to show."""
+        """Whether clients may ask for approval in a dialog: if the program can run and is short enough."""
         check = self._report_check(view)
         contract = "" if check is None else check.contract
         is_short = max(len(view.program), len(contract)) <= MAX_ASKED_CHARACTERS
@@ -159,9 +162,9 @@ class Gatekeeper:
 
     @contextmanager
     def waiting(self) -> Iterator[None]:
-        """Count the block as a waiting call. Raise MissionError if `MAX_WAITING_CALLS` wait already."""
+        """Count a `with` block as a waiting call. Raise MissionError if too many calls wait already."""
         if self._waiting >= MAX_WAITING_CALLS:
-            raise MissionError(f"{MAX_WAITING_CALLS} calls are waiting already; wait for their answers")
+            raise MissionError(f"{MAX_WAITING_CALLS} calls are waiting already; wait until one has ended")
         self._waiting += 1
         try:
             yield
@@ -176,12 +179,12 @@ class Gatekeeper:
         return self.check(made.reply.program)
 
     async def run_exclusively(self, kind: str, work: Callable[[], _Made]) -> _Made:
-        """Return the result of slow work. Raise MissionError if other work of this `kind` is under way.
+        """Run slow work on a new thread, so that people never wait for it, and return its result.
 
-        The work has a thread of its own, so that requests of people never wait for it.
+        Raise MissionError if work of the same `kind`, such as `check`, is still running.
         """
         if kind in self._under_way:
-            raise MissionError(f"another {kind} is under way; try again when that is over")
+            raise MissionError(f"another {kind} is still running; try again when it has finished")
         self._under_way.add(kind)
         made = Future[_Made]()
         made.set_running_or_notify_cancel()
@@ -197,7 +200,7 @@ class Gatekeeper:
         return await asyncio.wrap_future(made)
 
     def report(self, session: MissionSession | None, after: int = 0) -> MissionReport:
-        """Describe a session's mission for agents, with at most 1,000 events from the position `after`."""
+        """Describe a session's mission for agents, with up to 1,000 events after the first `after` ones."""
         view = SessionView() if session is None else session.view
         events = [] if session is None else session.events()
         seen = min(len(events), after + MAX_REPORTED_EVENTS)

@@ -25,7 +25,7 @@ class _Report(BaseModel):
 
 
 class CheckReport(_Report):
-    """The result of checking a program in imagined worlds."""
+    """A checked program: its problems, its contract, and storyboards of it in imagined worlds."""
 
     accepted: bool = Field(description="Whether there are no problems.")
     problems: list[str]
@@ -35,7 +35,7 @@ class CheckReport(_Report):
 
 
 class RobotReport(_Report):
-    """The robot, its rooms and skills, and the house rules."""
+    """The robot: its rooms, its skills, the house rules, and how to write a program for it."""
 
     robot: str
     rooms: list[str] = Field(description="Empty until a first proposal has connected the robot.")
@@ -63,14 +63,14 @@ class MissionReport(_Report):
 
 
 class SkillOutcome(_Report):
-    """The result of one call of a skill."""
+    """The result of one skill call, or the reason why the skill failed."""
 
     result: Any = Field(default=None, description="The result of the skill, if it returns one.")
     error: str = Field(default="", description="Why the skill failed; empty if it succeeded.")
 
 
 def report_check(check: CheckResult, program: str, problems: Sequence[str], contract: str) -> CheckReport:
-    """Convert the result of a check for agents, with the storyboards of the page as text."""
+    """Return a check's result for agents, with these problems, this contract, and storyboards as text."""
     return CheckReport(
         accepted=not problems,
         problems=[*problems],

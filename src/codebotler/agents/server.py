@@ -95,17 +95,17 @@ def _add_resources(server: MCPServer[Gatekeeper], gatekeeper: Gatekeeper) -> Non
 
     @server.resource("codebotler://missions", mime_type="application/json")
     async def missions() -> str:
-        """List the last missions, oldest first, without their programs."""
+        """List the latest missions as JSON, oldest first, without their programs and problems."""
         return await read(partial(_list_missions, home))
 
     @server.resource("codebotler://missions/{mission}", mime_type="application/json")
     async def mission(mission: str) -> str:
-        """Read a mission: its program, its state and the reason."""
+        """Return a mission as JSON: its program, its state and the reason for the state."""
         return await read(partial(_read_file, home, mission, SUMMARY_FILE))
 
     @server.resource("codebotler://missions/{mission}/log", mime_type="application/jsonl")
     async def log(mission: str) -> str:
-        """Read the log of a mission, one event per line."""
+        """Return the log of a mission as JSON Lines, one event per line."""
         return await read(partial(_read_file, home, mission, EVENTS_FILE))
 
 
@@ -129,7 +129,7 @@ def _read_file(home: Path, mission: str, name: str) -> str:
 
 
 def over_http(server: MCPServer[Gatekeeper], announce: Callable[[str], None]) -> Companion:
-    """Return a companion of the page that serves agents at `/mcp`. `announce` receives the page's address."""
+    """Return a server for agents at `/mcp` on the page's port. `announce` is called with its address."""
     security = TransportSecuritySettings(enable_dns_rebinding_protection=False)  # the page's guard has it
     (route,) = server.streamable_http_app(
         streamable_http_path=AGENT_PATH, transport_security=security, max_sessions=MAX_SESSIONS
@@ -145,7 +145,7 @@ def over_http(server: MCPServer[Gatekeeper], announce: Callable[[str], None]) ->
 
 
 def over_stdio(server: MCPServer[Gatekeeper], streams: Streams, announce: Callable[[str], None]) -> Companion:
-    """Return a companion of the page that serves one agent over `streams`, until its client closes them."""
+    """Return a server for one agent over `streams`. When the client closes them, the page ends, too."""
     server.streamable_http_app()  # makes the session manager, the public way to the server below
     running = server.session_manager.app
 
@@ -179,7 +179,7 @@ class _Input(asyncio.StreamReaderProtocol):
         self._is_closed = is_closed
 
     def eof_received(self) -> bool | None:
-        """Note that the client has closed its end."""
+        """Record that the client has closed standard input."""
         self._is_closed.set()
         return super().eof_received()
 
@@ -191,12 +191,12 @@ class _Output:
         self._writer = writer
 
     async def write(self, text: str) -> None:
-        """Write a text once the client has read most of the earlier ones."""
+        """Write a text, and wait until the client has read most of what was written."""
         self._writer.write(text.encode())
         await self._writer.drain()
 
     async def flush(self) -> None:
-        """Do nothing, because nothing is kept back."""
+        """Do nothing, since `write` keeps no text back."""
 
 
 async def _open_output(sent: BufferedWriter) -> Any:  # noqa: ANN401 - the SDK wants a file of anyio
@@ -209,10 +209,9 @@ async def _open_output(sent: BufferedWriter) -> Any:  # noqa: ANN401 - the SDK w
 
 
 def take_streams() -> Streams:
-    """Reserve standard input and output for the protocol. From now on, prints go to standard error.
+    """Reserve standard input and output for an MCP client, and send all prints to standard error.
 
-    Raises:
-        UserError: standard input is neither a pipe nor a socket, so no client started us.
+    Raise UserError if standard input is neither a pipe nor a socket, because then no client started us.
     """
     kind = os.fstat(0).st_mode
     if not (stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)):

@@ -65,7 +65,7 @@ class Steps:
         return _PROGRAM.format(mark=self.mark, purpose=purpose, contract=lines)
 
     def call(self, name: str, arguments: Mapping[str, object]) -> Future[SkillOutcome]:
-        """Queue a call and return its future outcome. Raise UserError if the call is wrong or not allowed."""
+        """Queue a skill call and return its future outcome. Raise UserError if it is wrong or not allowed."""
         if name not in (self.contract.skills.keys() | TELLING_SKILLS) & {*self.skills}:
             raise UserError(f"this mission may call only {listed(list(self.contract.skills))}")
         call = self.skills[name], named_arguments(self.skills[name], arguments), Future[SkillOutcome]()

@@ -69,15 +69,15 @@ _Seconds = Annotated[
 def read_robot(ctx: AgentContext) -> RobotReport:
     """Read the robot's rooms, its skills, the house rules, and how to write a program for it.
 
-    Call this first. This changes nothing.
+    Call this tool first. It changes nothing.
     """
     return gatekeeper_of(ctx).report_robot()
 
 
 async def check_program(program: _Program, ctx: AgentContext) -> CheckReport:
-    """Check a program in imagined worlds without a robot: its problems, and what the robot would do.
+    """Check a program in imagined worlds, and return its problems and what the robot would do.
 
-    This changes nothing and needs no approval. Correct all problems before you propose the program.
+    This tool uses no robot and needs no approval. Correct all problems before you propose the program.
     """
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors():
@@ -126,7 +126,7 @@ async def choose_behaviour(
     question: Annotated[OpenQuestion, Resolve(find_question)],
     answer: Annotated[ElicitationResult[Choice | NotAsked], Resolve(ask_which_behaviour)],
 ) -> MissionReport:
-    """Let the person say which of several behaviours they mean, if a proposed mission waits for that.
+    """Let the person choose between several behaviours, if the proposed mission waits for this choice.
 
     You cannot choose for them. Afterwards, the answer has the program, which still needs approval.
     """
@@ -158,7 +158,7 @@ async def continue_mission(
         if past.unsure is not None:
             raise UserError(f"{past.unsure_step_text}; a person must say so, on the page {gatekeeper.page}")
         if not program.strip() and not past.instruction:
-            raise UserError("this mission has no instruction; send a program for the rest")
+            raise UserError(f"mission {past.mission} has no instruction; send a program for its rest")
         author = agent_name(ctx) if program.strip() else ""
         session = gatekeeper.propose(gatekeeper.console.rest_of(past, program, author))
         return await _prepared(gatekeeper, session)
@@ -298,7 +298,7 @@ def _take_answer(
         case AcceptedElicitation(data=Consent(approve=True)):
             if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
                 if view.problems != proposed.problems:
-                    raise MissionError("the check now has other problems; call run_mission again")
+                    raise MissionError("the problems of the program have changed; call run_mission again")
                 session.approve(
                     digest,
                     despite_problems=bool(view.problems),

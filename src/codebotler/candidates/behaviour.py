@@ -37,10 +37,10 @@ class Behaviour:
     Args:
         said: the room and the claims of the statements between two drives. All statements without claims,
             such as greetings, are alike.
-        moved: the things that were picked up and put down, with the room, in order of their names.
+        moved: for each thing picked up or put down, `pick` or `place`, the thing and the room; sorted.
         asked: the room, the options and the person of each question; case and order do not matter. The
-            person counts only where candidates name different ones.
-        done: the other skills with their arguments, in order of their names.
+            person is empty unless candidates ask different people in this room.
+        done: for each call of another skill, its kind of event and its arguments; sorted.
         ending: `waits` if the run reached a limit, or else the kind of its error; empty if it finished.
         room: the room where the robot ended; empty unless the run finished.
     """
@@ -64,12 +64,12 @@ def behaviour_of(
     names: re.Pattern[str] = NO_NAME,
     shared_rooms: frozenset[str] = frozenset(),
 ) -> Behaviour:
-    """Return the behaviour of a run.
+    """Return what a person would notice of a run.
 
     Args:
         outcome: the run.
         start: the room where the robot started.
-        names: a regex from `names_in`. Statements may make claims about the names that it finds.
+        names: a regex from `names_in` for the names about which statements may make claims.
         shared_rooms: the rooms in which it matters who is asked, from `rooms_with_several`.
     """
     trace = outcome.trace
@@ -97,7 +97,7 @@ def behaviour_of(
 
 
 def statements(trace: Trace) -> Iterator[tuple[str, str]]:
-    """Yield the room and the text of each statement. All that is said before a drive is one statement."""
+    """Yield the room and the text of each statement. All texts between two drives form one statement."""
     spoken = (one for one in trace if one.kind == SAY or (one.kind == GOTO and one.destination != one.place))
     for is_drive, some in groupby(spoken, key=lambda one: one.kind == GOTO):
         if not is_drive:
@@ -107,7 +107,7 @@ def statements(trace: Trace) -> Iterator[tuple[str, str]]:
 
 
 def wording(trace: Trace) -> frozenset[str]:
-    """Return all that the robot says and asks, in lower case."""
+    """Return the texts that the robot says and the questions that it asks, in lower case."""
     return frozenset(_plain(one.text) for one in trace if one.kind in {SAY, ASK})
 
 
@@ -115,7 +115,7 @@ def count_conflicts(traces: Iterable[Trace], homes: Iterable[tuple[str, str]] = 
     """Count contradictions between runs in the same world.
 
     For example, one run meets a person whom another misses, a person is in several rooms, or a question has
-    several answers. `homes` are further people, each with a room.
+    several answers. `homes` are further people who are present, as pairs of a name and a room.
     """
     seen = {one for trace in traces for one in _encounters(trace)}
     people = {(one.name, one.room) for one in seen if one.is_there and one.is_person} | {*homes}
@@ -133,7 +133,7 @@ def people_sought(traces: Iterable[Trace]) -> set[tuple[str, str]]:
 
 
 class Encounter(NamedTuple):
-    """A person or thing that a run met in a room, or missed there."""
+    """A person or thing that the robot found in a room, or looked for there without success."""
 
     name: str
     room: str
@@ -171,7 +171,7 @@ def rooms_with_several(traces: Iterable[Trace]) -> frozenset[str]:
 
 
 def names_in(rooms: Iterable[str], traces: Iterable[Trace]) -> re.Pattern[str]:
-    """Return a regex that finds the names of rooms, and of what runs look for, ask, carry or offer.
+    """Return a regex for the names of rooms and of people, things and options in the calls of runs.
 
     Words such as "anybody", "yes" and "no" are not names.
     """
@@ -192,7 +192,7 @@ def names_in(rooms: Iterable[str], traces: Iterable[Trace]) -> re.Pattern[str]:
 
 @lru_cache(maxsize=16_384)
 def claims_of(text: str, names: re.Pattern[str]) -> Claims:
-    """Return the claims of a statement: numbers, times of day, and the names that it affirms or denies."""
+    """Return a statement's claims: numbers, times of day, and affirmed or denied names (see `Claims`)."""
     found = {_clock_claim(readings[0]) for readings in times_in(text) if readings != ZERO}
     parts = [clause for sentence in sentences(text) for clause in clauses(sentence, lists=True)]
     for clause in complete_clauses(parts):

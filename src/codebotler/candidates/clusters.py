@@ -43,11 +43,11 @@ ROOM_NUMBER = re.compile(r"\s*\d+$")
 
 @dataclass(frozen=True)
 class CandidateCluster:
-    """Candidates that do the same in all worlds.
+    """Candidate programs that behave alike in all shared imagined worlds.
 
     Args:
         programs: the different programs, beginning with the most frequent one.
-        size: the number of candidates.
+        size: the number of candidates; equal programs count separately.
         behaviours: the behaviour of the first program in each world.
         samples: the runs of the first program in each world.
     """
@@ -68,7 +68,7 @@ class CandidateCluster:
         return sum(sample.in_vain for sample in self.samples)
 
     def extended(self, samples: Sequence[Sample], behaviours: Sequence[Behaviour]) -> CandidateCluster:
-        """Return the cluster with added runs of its first program, in further worlds."""
+        """Return a copy with runs of the first program in further worlds, and their behaviours."""
         runs, all_behaviours = (*self.samples, *samples), (*self.behaviours, *behaviours)
         numbered = tuple(replace(sample, number=number) for number, sample in enumerate(runs))
         return replace(self, samples=numbered, behaviours=all_behaviours)
@@ -82,7 +82,7 @@ class CandidateClusters:
         clusters: at least one. If the check rejects all candidates, the only cluster has the first of them.
         rejected: for each rejected candidate that is not in a cluster, the first problem.
         unwanted: the number of accepted candidates that behave like a refused program.
-        people: the names of the people on the map, from `normalized`.
+        people: the names of the people on the map, in lower case and without articles.
     """
 
     clusters: tuple[CandidateCluster, ...]
@@ -97,7 +97,7 @@ class CandidateClusters:
 
     @property
     def summary(self) -> str:
-        """A phrase about the choice of a cluster: "took the most frequent behaviour: 3 of 4 programs"."""
+        """A phrase about the chosen program: "took the most frequent behaviour: 3 of 4 programs"."""
         some, largest, total = self.rejected, self.clusters[0], counted(self.total, "program")
         if not largest.samples:
             every = counted(self.total + len(some), "program")
@@ -113,7 +113,7 @@ class CandidateClusters:
 
 
 def main_reason(rejected: Sequence[str]) -> str:
-    """Return the most frequent of some problems: ` (2 of them: there is no lab)`; empty if there are none."""
+    """Return the most frequent problem, such as ` (2 of them: there is no lab)`, or "" if there is none."""
     for problem, count in Counter(rejected).most_common(1):
         some = f"{'all' if count == len(rejected) else count} of them: " * (len(rejected) > 1)
         return f" ({some}{shortened(problem)})"
@@ -161,8 +161,7 @@ def cluster_candidates(
     for number in _wanted(behaviours, len(accepted)) or _wanted(texts, len(accepted)):
         together.setdefault(behaviours[number], []).append(number)
     if not together:
-        again = counted(len(programs) - len(rejected), "program")
-        raise UserError(f"{again} would again do what was not meant; give the instruction in other words")
+        raise UserError("all new programs do what you rejected before; give the instruction in other words")
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     people = frozenset(map(normalized, rooms.people))
     conflicts = [*map(bool, conflicts_in_worlds(clusters, people).values())]
@@ -180,7 +179,7 @@ def compare_candidates(
     room_map: RoomMap | None = None,
     refused: Sequence[str] = (),
 ) -> CandidateClusters:
-    """Group candidates on a worker of this process's pool; see `cluster_candidates`."""
+    """Check and group candidates as `cluster_candidates` does, on a worker of this process's pool."""
     pool = shared_pool()
     return pool.call(lambda: cluster_candidates(pool.here(), programs, settings, room_map, refused))
 
@@ -204,9 +203,9 @@ def _cluster(
 
 
 def shared_rooms(programs: Iterable[str], checks: Sequence[CheckResult], settings: CheckSettings) -> RoomMap:
-    """Return one map of the rooms that any program names, without "office" if another is "ann's office".
+    """Return one map with the rooms of all programs, without "office" if there is also "ann's office".
 
-    If a program lists the rooms, there are two of each kind, since a loop needs several rooms to go wrong.
+    If a program asks for all rooms, add a second room of each kind, which may reveal a mistake in a loop.
     """
     start = checks[0].room_map.start
     events = (event for one in checks for sample in one.samples for event in sample.outcome.trace)
@@ -226,7 +225,7 @@ def run_in_shared_worlds(
 ) -> list[list[Sample]]:
     """Run programs in the same worlds. Return a list for each program, with its run in each world.
 
-    The first worlds are random. Further ones try both values of each fact that a program meets.
+    The first worlds are random. Further ones try the other values of the facts that a program meets.
     """
     first = first_samplers(replace(settings, samples=RANDOM_WORLDS))
     new = [replace(sampler, by_options=True) for sampler in first]
@@ -242,7 +241,10 @@ def run_in_shared_worlds(
 
 
 def conflicts_in_worlds(clusters: Sequence[CandidateCluster], people: Container[str] = ()) -> dict[int, int]:
-    """Count the contradictions in each world where the clusters differ. The keys are numbers of worlds."""
+    """Return how many contradictions there are, by the number of each world where the clusters differ.
+
+    `people` are names from `normalized`; their random rooms count, too.
+    """
     conflicts: dict[int, int] = {}
     for number in range(len(clusters[0].samples)):
         if len({one.behaviours[number] for one in clusters}) > 1:

@@ -55,8 +55,8 @@ class CandidateOption:
         program: the program that the robot would run.
         size: the number of candidates that behave like it, in this world at least.
         steps: its steps in the world of the question, from `steps_of`.
-        difference: only how it differs from the other options, such as "ends in kitchen".
-        own: the numbers of the steps that not all options share.
+        difference: how it differs from the other options, such as "ends in kitchen".
+        own: the numbers, from 1, of the steps that not all options share.
         share: how many candidates behave like it, and in how many worlds it waits without success, in words.
     """
 
@@ -76,7 +76,7 @@ class ClarifyingQuestion:
         options: two or three options with different behaviours: those that finish, then the most frequent.
         facts: the facts of the imagined world that explain the differences, in words.
         total: the number of accepted candidates.
-        sample: the number of the imagined world.
+        sample: the number of the imagined world, from 0.
         rejected: for each candidate that the check rejected, the first problem.
         unwanted: the number of accepted candidates that behave like a refused program.
         why_last: why no new programs are written after the answer `none`; empty if some are.
@@ -131,7 +131,7 @@ class ClarifyingQuestion:
         return self.options[0 if answer == "decide" else answer]
 
     def record(self, answer: ClarifyingAnswer) -> list[str]:
-        """Return sentences for a log: which option was chosen, and which ones were not."""
+        """Describe an answer for the log: which option was chosen, and which ones were not."""
         if (option := self.chosen(answer)) is None:
             return self.rejections
         who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
@@ -252,9 +252,9 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
 def describe_differences(
     samples: Sequence[Sample], behaviours: Sequence[Behaviour]
 ) -> list[tuple[str, frozenset[int]]]:
-    """Return how each run in one world differs from the others, in words and as the numbers of its own steps.
+    """Return for each run how it differs, such as `ends in kitchen`, and the numbers of its own steps.
 
-    Such words are `ends in kitchen`. The own steps are those that not all runs share, numbered from 1.
+    All runs are in the same world. Own steps are those that not all runs share, numbered from 1.
     """
     said, traces = [one.said for one in behaviours], [one.outcome.trace for one in samples]
     rooms = {room for one in said for other in said for room, _ in one - other}  # where statements differ

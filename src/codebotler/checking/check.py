@@ -59,14 +59,14 @@ def check(
         start: the robot's first room, one of `rooms` if given; by default `start_loc` or else the first room.
         samples: how many worlds to sample, from 1 to 10,000.
         seed: the random seed, which gives the same worlds on all machines.
-        strict: whether to randomize even facts that the program assumes, such as that a person it asks is in.
+        strict: whether to randomize even facts that the program assumes, such as that a person is there.
         skills: the skills that the program may call.
         pool: runs the program on one of its workers; by default the pool of this process.
         room_map: a map that replaces `rooms` and `start` if more is known about the rooms.
         house_rules: the rules that the program must keep in every world.
         explores: whether to find the contract and a proof for each rule, by running the program in all
             worlds that it can tell apart, within a limit.
-        is_wanted: called before each run, from another thread; False ends the check.
+        is_wanted: returns False to end the check; called before each run, on another thread.
 
     Raises:
         UnwantedCheckError: the check is no longer wanted.
@@ -99,7 +99,7 @@ def check_on(
     settings: CheckSettings | None = None,
     known: Sequence[Sample] = (),
 ) -> CheckResult:
-    """Check one program on a worker that no other thread uses, and reuse its earlier runs, `known`."""
+    """Check a program on a worker that no other thread uses. Its earlier runs, `known`, are reused."""
     how = settings or CheckSettings()
     room_map = room_map or room_map_for(program, skills=how.skills)
     with worker.one_child():
@@ -114,7 +114,7 @@ def check_on(
 def check_together(
     worker: Worker, programs: Sequence[tuple[str, RoomMap]], settings: CheckSettings
 ) -> list[CheckResult]:
-    """Check several programs on one worker. Their first runs may share a process, which is faster."""
+    """Check several programs, each in its rooms, on one worker. This is faster than one after another."""
     samplers = first_samplers(settings)[:WORLDS_AT_ONCE]
     runs = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
     return [
@@ -149,7 +149,7 @@ def room_map_for(
             try:
                 check_label(room)
             except ValueError as error:
-                raise UserError(f'the room is "{room}", but {error}') from None
+                raise UserError(f'the name of a room is "{room}", but {error}') from None
         names = tuple(dict.fromkeys(rooms)) or (start or DEFAULT_START,)
         start = start or (DEFAULT_START if DEFAULT_START in names else names[0])
         if start not in names:
@@ -167,7 +167,7 @@ def room_map_for(
 
 
 def extend_check(worker: Worker, program: str, found: CheckResult, settings: CheckSettings) -> CheckResult:
-    """Return a check with the contract, rule proofs and new problems from exploring the program's worlds.
+    """Explore a program's worlds, and return its check with a contract, rule proofs and further problems.
 
     Args:
         worker: a worker that no other thread uses.
@@ -207,7 +207,7 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
 
 
 def with_contract_problems(found: CheckResult, allowed: Contract, skills: SkillTable) -> CheckResult:
-    """Return a check with a new problem for each skill that may be used beyond the allowed contract."""
+    """Return a check with a further problem for each skill that may do more than the contract allows."""
     if found.contract is None:
         return found
     new = [" ".join(filter(None, row)) for row in contract_rows(found.contract.excess_over(allowed), skills)]

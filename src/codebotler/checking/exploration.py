@@ -76,10 +76,10 @@ class ExploringGuard(RuleGuard):
             self._asked.add(call)
         self.calls.append(call)
         if len(self.calls) - 1 == self.fails_at:
-            raise RobotError("SkillFailed", f"the robot failed in {row.name}")
+            raise RobotError("SkillFailed", f"the skill {row.name} failed")
 
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
-        """Record the rules that the next event, which is one of `attempts`, would break."""
+        """Record, without refusing anything, the rules that a possible next event would break."""
         self._keep(self.find_violations(attempts, is_drive=is_drive))
 
     def judge_result(self, event: Event) -> None:
@@ -87,7 +87,7 @@ class ExploringGuard(RuleGuard):
         self._keep(self.add_event(event))
 
     def find_first_unkept(self) -> None:
-        """Record the rules that are broken if the mission ends now."""
+        """Record all rules that are broken if the mission ends now, instead of returning the first."""
         self._keep(self.find_unkept())
 
     def _keep(self, found: Iterable[RuleViolationError]) -> None:
@@ -137,7 +137,7 @@ class _Tree:
         self.has_assumed = False  # whether a run took facts for granted
 
     def runs(self) -> Iterator[tuple[Sample, ExploringGuard]]:
-        """Run one branch after another, until the budget is spent."""
+        """Run the program in each world until the budget is spent. Yield each run and its guard."""
         with self._worker.one_child():
             while self.waiting and min(self._runs_left, self._lone_runs_left, self._calls_left) > 0:
                 count = min(RUNS_AT_ONCE, self._runs_left)
@@ -166,7 +166,7 @@ class _ExploringRuns(SampledRuns):
     fails_at: int | None = None
 
     def new_guard(self) -> ExploringGuard:
-        """Return a guard for one run."""
+        """Return a guard that records the calls and the broken rules of one run."""
         return ExploringGuard(self.settings.house_rules, self.room_map, self.fails_at)
 
 

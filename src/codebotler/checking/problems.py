@@ -89,7 +89,7 @@ class RuleProof:
 
 @dataclass(frozen=True)
 class Sample:
-    """One run of a program in a sampled world."""
+    """One run of a program in a sampled world: how it ended, and the facts that it met."""
 
     number: int  # the number of the world, counted from 0
     outcome: Outcome
@@ -100,17 +100,17 @@ class Sample:
     repeated: Trace = ()  # the steps that a mission which the program continues has done already
 
     def would_repeat_in(self, sampler: FactSampler) -> bool:
-        """Whether a run in the sampler's world would discover the same facts, and therefore be identical."""
+        """Whether the program would meet the same facts in the sampler's world, and so do the same."""
         return all(draw.holds_in(sampler) for draw in self.draws)
 
     @property
     def drawn(self) -> tuple[str, ...]:
-        """The random facts of the world, in words."""
+        """The random facts that the run met, one sentence each."""
         return tuple(dict.fromkeys(fact.sentence for fact in self.facts if fact.is_random))
 
     @property
     def world(self) -> str:
-        """All facts of the world, in words."""
+        """All facts that the run met, in words: "Anne is in the lab and ..."."""
         return listed(list(dict.fromkeys(fact.sentence for fact in self.facts)))
 
 
@@ -123,9 +123,9 @@ class CheckResult:
         samples: the runs; empty if the program does not parse.
         room_map: the rooms of all worlds.
         seed: the seed of the worlds.
-        strict: whether all facts were random.
+        strict: whether all facts were random, even those that the program takes for granted.
         proofs: a verdict on each house rule; empty unless the check explored worlds.
-        contract: what the program may do at most; None unless the check explored worlds.
+        contract: the limits of what the program may do; None unless the check explored worlds.
     """
 
     problems: tuple[Problem, ...]
@@ -143,12 +143,12 @@ class CheckResult:
 
     @property
     def rooms(self) -> tuple[str, ...]:
-        """The rooms, in the robot's order."""
+        """The names of the rooms, in the order in which the robot lists them."""
         return self.room_map.rooms
 
     @property
     def rooms_are_guessed(self) -> bool:
-        """Whether the rooms were taken from the program itself."""
+        """Whether the rooms were guessed from the program, because none were given."""
         return self.room_map.guessed
 
     @property
@@ -201,7 +201,7 @@ class CheckResult:
 
 
 def no_room(request: str, room_map: RoomMap) -> str:
-    """Return why a request names no single room: `there is no room "hal"; the closest is "hall"`."""
+    """Return why a request means no room or several: `there is no room "hal"; the closest is "hall"`."""
     if len(possible := room_map.possible_rooms(request)) > 1:
         return ambiguous(brief(request), possible)
     name = brief(request)

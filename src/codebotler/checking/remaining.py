@@ -30,7 +30,7 @@ def remaining_outcomes(
         begun: the source of the interrupted program.
         room_map: the rooms, and in `past` the steps that the robot has done.
         skills: the robot's skills.
-        first: the number of steps that the robot had done when the program began.
+        first: the number of these steps that the robot had done before the program began.
         worker: a worker that no other thread uses; by default one of the shared pool.
     """
     if worker is None:
@@ -70,7 +70,7 @@ class RepeatingRobot(SampledRobot):
             finally:
                 self.room = here
         if (event.kind, event.text.casefold()) != (past.kind, past.text.casefold()):
-            raise RobotError(SKILL_FAILED, "the call failed before")
+            raise RobotError(SKILL_FAILED, "the call failed in the interrupted mission")
         self.left.popleft()
         if not event.options:
             return past.found

@@ -44,7 +44,7 @@ def with_repetition_problems(
 ) -> CheckResult:
     """Return a check with further problems: steps that were done already, and a thing that is not put down.
 
-    The program may wait without end if the first program does, since what both wait for may still come.
+    If the first program waits without end, this is no problem in the new one: the event may still come.
 
     Args:
         found: the check of a program for the rest of a mission; `room_map.past` has the steps done so far.
@@ -83,7 +83,7 @@ def with_repetition_problems(
 def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome] = ()) -> Iterator[Event]:
     """Yield the steps of a trace that the robot has done already, such as the same question in the same room.
 
-    If the trace has more steps of a kind in a room than `remaining`, steps in other words count as well.
+    If the trace has more steps of a kind in a room than `remaining`, similar wording counts as the same step.
     """
     done = _distinct(event for event in room_map.past if not event.failed)
     later = _distinct(event for one in remaining for event in one.trace)
@@ -134,7 +134,7 @@ def _sort(event: Event, room_map: RoomMap) -> tuple[str, str]:
 
 
 def has_same_effect(one: Event, other: Event, room_map: RoomMap) -> bool:
-    """Whether two steps say, ask or do the same in the same room; False for a kind that may be repeated."""
+    """Whether two steps say, ask or do the same in the same room. False for looks, drives and pick-ups."""
     if one.kind != other.kind or one.kind == PICK or not _has_effect(one.kind):
         return False
     if _room(one, room_map) != _room(other, room_map) or normalized(one.to or "") != normalized(

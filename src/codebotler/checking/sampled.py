@@ -31,7 +31,7 @@ WORLDS_AT_ONCE = 16
 
 @dataclass(frozen=True)
 class CheckSettings:
-    """Settings of a check."""
+    """The settings of a check: how many worlds there are, and which skills and house rules apply."""
 
     samples: int = DEFAULT_SAMPLES  # how many random worlds come first
     seed: int = 0  # gives the same worlds on all machines
@@ -47,7 +47,7 @@ class CheckSettings:
 
 
 class UnwantedCheckError(Exception):
-    """Raised before the next run of a check if `is_wanted` of its settings returns False."""
+    """Raised before the next run of a check if its result is not wanted any more (see `CheckSettings`)."""
 
 
 class SampledRuns:
@@ -62,7 +62,7 @@ class SampledRuns:
         self.job: Job = program, [partial(self._new_robot, number) for number in range(len(samplers))]
 
     def samples_on(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
-        """Return a sample for each world that repeats no run. `known` maps a world's index to its outcome."""
+        """Return a sample for each different world. Outcomes in `known`, by the world's index, are reused."""
         ran: list[Sample] = []
         for number, sampler in enumerate(self.samplers):
             if number in known:
@@ -91,7 +91,7 @@ class SampledRuns:
 
 
 def run_together(worker: Worker, runs: Sequence[SampledRuns]) -> list[list[Sample]]:
-    """Run several programs, and return the samples of each. Simple programs share a process."""
+    """Run several programs, and return a list of samples for each. Simple programs share a process."""
     known: list[dict[int, Outcome]] = [{} for _ in runs]
     for (number, run), outcome in worker.run_tame([one.job for one in runs]).items():
         known[number][run] = outcome
@@ -107,10 +107,10 @@ def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
 def run_in_sampled_worlds(
     worker: Worker, program: str, room_map: RoomMap, settings: CheckSettings, known: Sequence[Sample] = ()
 ) -> list[Sample]:
-    """Run a program in the first worlds, then in further ones until both values of each fact have been tried.
+    """Run a program in random worlds, then in more, up to a limit, to try all values of the facts it meets.
 
-    Further worlds are also added as long as every run waits or searches without success. Worlds that would
-    repeat a run, or one of the `known` runs, share its result.
+    Further worlds are also added while every run waits or searches without success. If a run would repeat
+    an earlier one, or one of `known`, the program is not run again, and the result is copied.
     """
     runs = [*known]  # which differ
     ran: list[Sample] = []
@@ -141,7 +141,7 @@ def run_in_sampled_worlds(
 
 
 def unexplored_samplers(ran: Sequence[Sample], drew: Sequence[FactSampler]) -> list[FactSampler]:
-    """Return samplers of worlds that change one fact of an earlier world to a value not seen before."""
+    """Return samplers of new worlds: each changes one fact of an earlier run to a value that no run met."""
     met = {(draw.method, draw.arguments, draw.result) for sample in ran for draw in sample.draws}
     found: list[FactSampler] = []
     for sample, sampler in zip(ran, drew, strict=True):

@@ -20,7 +20,7 @@ STEP_MARK = "❱"
 
 
 def steps_of(trace: Trace, *, has_places: bool = False) -> list[dict[str, Any]]:
-    """Convert a trace to a list of steps, numbered from 1. With `has_places`, each step names its room."""
+    """Convert a trace to JSON data: a dictionary per step, numbered from 1; with rooms if `has_places`."""
     return [_step_data(number, event, has_places=has_places) for number, event in enumerate(trace, 1)]
 
 
@@ -48,7 +48,7 @@ def event_from_step(step: Mapping[str, Any]) -> Event:
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
-    """Return a table of steps, room by room. The steps whose numbers are in `needed` are marked and shown."""
+    """Return a table of steps, room by room, shortened if long. Step numbers in `needed` are marked."""
     table = grid("right", "left")
     if not steps:
         table.add_row(Text(), Text("the robot did nothing", "dim"))
@@ -70,7 +70,7 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 def select_steps(
     steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 ) -> Iterator[tuple[bool, Sequence[Mapping[str, Any]]]]:
-    """Group consecutive steps by whether to show them: of a long trace, both ends and those in `needed`."""
+    """Yield groups of steps, and whether to show each: of a long trace, both ends and those in `needed`."""
 
     def is_shown(step: Mapping[str, Any]) -> bool:
         number = step["step"]
@@ -100,7 +100,7 @@ def _drive(step: Mapping[str, Any]) -> Text:
 
 
 def grid(*justify: Literal["left", "right"]) -> Table:
-    """Return a table without lines. Right-aligned columns are for numbers, and never wrap."""
+    """Return a table without lines, and with columns of these alignments. Right-aligned ones never wrap."""
     table = Table.grid(padding=(0, 2, 0, 0))
     for side in justify:
         table.add_column(justify=side, no_wrap=side == "right", overflow="fold")

@@ -67,7 +67,7 @@ class Generation:
 
 
 def ignore_attempt(_attempt: Attempt) -> None:
-    """The default for `on_attempt`: do nothing."""
+    """Do nothing. This is the default for `on_attempt`."""
 
 
 async def write_program(
@@ -81,8 +81,8 @@ async def write_program(
 ) -> Generation:
     """Ask a model for a program until `find_problems` accepts one (rejection sampling; paper, section V).
 
-    Ask again at most `retries` times. With `repair`, a further request includes the rejected program and its
-    problems, or says why the last reply has no program. Close the model at the end.
+    Ask again at most `retries` times; with `repair`, the request then includes the rejected program and its
+    problems. Accept any program if `find_problems` is None. Close the model at the end.
     """
     attempts: list[Attempt] = []
     limited, request = RateLimited(model, concurrency=1), prompt
@@ -107,7 +107,7 @@ async def make_attempt(
     settings: SamplingSettings,
     find_problems: Checker | None = None,
 ) -> Attempt:
-    """Check the program in a reply, and return the attempt. A missing program is its only problem."""
+    """Check the program in a reply, and return the attempt. If there is no program, the problem says so."""
     if (none := describe_programless(reply, settings)) is not None:
         return Attempt(number, prompt, reply, (none.sentence,), none)
     found = () if find_problems is None else await asyncio.to_thread(find_problems, reply.program)
@@ -117,7 +117,7 @@ async def make_attempt(
 async def gather_candidates(
     model: Model, prompt: Prompt, count: int, on_text: TextListener = ignore_text
 ) -> list[Attempt]:
-    """Ask a model `count` times for a program, check none of them, and close the model.
+    """Ask a model for `count` programs, several at a time. Do not check them; close the model at the end.
 
     Raises:
         ModelError: the model sent no complete reply to one of the requests.
@@ -149,7 +149,7 @@ def write_checked_program(
     repair: bool = False,
     on_attempt: Callable[[Attempt], None] = ignore_attempt,
 ) -> Generation:
-    """Ask a model, at most `retries` + 1 times, until a program passes the check in sampled worlds."""
+    """Ask a model, at most `retries` + 1 times, until a program passes the check. Return all attempts."""
     with WorkerPool(1) as pool:
 
         def find_problems(program: str) -> list[str]:
@@ -203,7 +203,7 @@ def generate(
     """
     tries = int(repair) if retries is None else retries
     if tries < 0:
-        raise UserError(f"the number of retries is {tries}; it must be at least 0")
+        raise UserError(f"retries must be at least 0, not {tries}")
     prompt = prompt_for(instruction, rooms=rooms or (), skills=skills)
     opened = open_model(model, settings or SamplingSettings())
     return write_checked_program(opened, prompt, rooms=rooms, retries=tries, repair=repair, skills=skills)

@@ -15,7 +15,7 @@ MAX_REFUSAL_CHARACTERS = 200
 
 @dataclass(frozen=True)
 class ProgramlessReply:
-    """A model's reply that contains no program."""
+    """A model's reply that contains no program, and the reason why."""
 
     kind: NoProgram  # why there is no program
     sentence: str  # the reason for people
@@ -25,12 +25,12 @@ class ProgramlessReply:
 
     @property
     def can_repair(self) -> bool:
-        """Whether sending the reason to the model may help. False after a content filter."""
+        """Whether it may help to ask again with the reason. False if a content filter stopped the reply."""
         return self.kind != "filtered"
 
 
 def describe_programless(reply: Reply, settings: SamplingSettings) -> ProgramlessReply | None:
-    """Describe a reply without a program, or return None if the reply has a program."""
+    """Return why a reply to a request with these settings has no program, or None if it has one."""
     kind = reply.no_program
     if kind is None:
         return None

@@ -18,14 +18,14 @@ CODE_START = re.compile(
 
 @dataclass(frozen=True)
 class PartialReply:
-    """The part of a reply that has arrived so far."""
+    """The part of a reply that has arrived so far, split into text and code."""
 
     text: str = field(repr=False)  # such as an explanation or reasoning
     code: str = field(repr=False)  # the last block of code so far; empty until code begins
 
 
 def split_partial(reply: str) -> PartialReply:
-    """Split the start of a reply into text and code. Reasoning between tags counts as text."""
+    """Split a reply that is still arriving into text and code. Reasoning between tags counts as text."""
     thought = max((tag.end() for tag in REASONING_END.finditer(reply)), default=0)
     reasoning, answer = reply[:thought], reply[thought:]
     if REASONING_START.match(answer):

@@ -21,7 +21,7 @@ WIDTH = 110  # characters of a line
 
 
 class ContractFile(BaseModel):
-    """A file with a contract."""
+    """The content of a contract file: what a program may pass to each skill."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -34,7 +34,7 @@ def read_contract(path: Path, skills: SkillTable = SKILLS) -> Contract:
 
     Args:
         path: the file.
-        skills: the skills that it may name.
+        skills: the skills that the contract may name.
 
     Raises:
         UserError: the file is not valid; the message gives the line and the fix.
@@ -70,7 +70,7 @@ def _read_bound(file: YamlFile, row: Skill, given: Mapping[str, Any]) -> SkillBo
             raise file.wrong(f'{row.name} has no key "{key}"; its keys are {", ".join(known)}', *where)
         is_list = isinstance(value, list) and all(isinstance(one, str) for one in value)
         if not (type(value) is int and value > 0 if key == AT_MOST else value == ANY or is_list):
-            needed = "a whole number above 0" if key == AT_MOST else "any, or a list of texts in quotes"
+            needed = "a whole number above 0" if key == AT_MOST else "any or a list of texts in quotes"
             raise file.wrong(f'"{key}" must be {needed}', *where)
     missing = [name for name in names if name not in given]
     if missing:
@@ -92,12 +92,12 @@ def _templates(file: YamlFile, row: Skill, name: str, given: str | list[str]) ->
         except ValueError as error:
             raise file.wrong(str(error), *where) from None
         if found[-1].is_any and text.replace("{}", "").strip():
-            raise file.wrong("this text is too long, so that any text would be allowed; shorten it", *where)
+            raise file.wrong("a text this long would allow any other text; shorten the text", *where)
     return tuple(found)
 
 
 def contract_data(contract: Contract) -> dict[str, Any]:
-    """Return a contract as plain data, for YAML and JSON."""
+    """Return a contract as dictionaries and lists, with the keys of a contract file."""
     return {"version": 1, "skills": {name: _bound_data(bound) for name, bound in contract.skills.items()}}
 
 

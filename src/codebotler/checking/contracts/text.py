@@ -28,7 +28,7 @@ LONG_TEXT = 30  # characters
 def contract_rows(
     contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief_part, *, is_short: bool = False
 ) -> Iterator[tuple[str, str, str]]:
-    """Yield three texts per skill: verb, objects, limit: ("pick up", '"mug" in "office"', "at most 2 times").
+    """Yield each skill's verb, objects and limit, as ("pick up", '"mug" in "office"', "at most 2 times").
 
     If `is_short`, long lists end with a number, such as "or 4 more". `show` shortens a single text.
     """
@@ -45,9 +45,9 @@ def contract_rows(
 def contract_sentence(
     contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief_part, *, is_short: bool = True
 ) -> str:
-    """Return a sentence or two about what a program may do at most, and what it never does.
+    """Return a contract in a sentence or two: what the program may do, and what it never does.
 
-    If `is_short`, long lists end with a number, such as "or 4 more"; show a table of all texts as well.
+    If `is_short`, long lists end with a number, such as "or 4 more". `show` shortens a single text.
     """
     rows = contract_rows(contract, skills, show, is_short=is_short)
     may = [f"{what} {allowed}".strip() for what, allowed, _ in rows]

@@ -45,7 +45,7 @@ Sets: TypeAlias = Mapping[str, Sequence[str]]
 
 
 class HouseRuleFile(BaseModel):
-    """One rule in a file of house rules."""
+    """An entry in a file of house rules: one rule with its sentence and its formula."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -84,7 +84,7 @@ class HouseRuleFile(BaseModel):
     def with_single_names(
         self, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets
     ) -> Iterator[Rule]:
-        """Yield a copy of the rule for each single name in its sets, so that a misspelled name is noticed."""
+        """Yield a copy of the rule for each name in its sets, with this name only, to find wrong ones."""
         (text,) = self._texts.values()
         for used in {tag[1] for tag in SET_TAG.finditer(text)} & {*sets}:
             yield from (self.rule(file, at, skills, {**sets, used: [name]}) for name in sets[used])
@@ -107,7 +107,7 @@ class HouseRuleFile(BaseModel):
 
 
 class HouseRulesFile(BaseModel):
-    """A file of house rules."""
+    """The content of a file of house rules: named sets and rules."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -154,7 +154,7 @@ def _parse(text: str, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Se
         for pattern in _regexes(element):
             if slow_text(pattern) is not None:
                 sentence = f"searching a long text for {pattern!r} takes too much time"
-                raise file.wrong(f"{sentence}; no two repetitions may match the same text", *at)
+                raise file.wrong(f"{sentence}; let no two repetitions match the same text", *at)
     return formula
 
 

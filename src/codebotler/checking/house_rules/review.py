@@ -36,7 +36,7 @@ ANY_EVENT = Or(tuple(Exists(EventPattern(kind, Regex(".*"))) for kind in SKILLS.
 
 @dataclass(frozen=True)
 class Review:
-    """The examples and warnings for one rule."""
+    """A house rule with a trace that keeps the rule, one that breaks it, and warnings."""
 
     rule: Rule
     keeps: Trace | None  # a shortest trace that keeps the rule, if possible with an event it mentions
@@ -45,7 +45,7 @@ class Review:
 
 
 def review_rules(rules: Sequence[Rule], world: World | None = None) -> list[Review]:
-    """Return examples and warnings for each rule. With a world, the examples use its rooms."""
+    """Return examples and warnings for each rule. If a world is given, the examples use its rooms."""
     found = {rule.name: _review(rule, world) for rule in rules}
     for one, other in combinations(rules, 2):
         for rule, warning in _pair_warnings(one, other, world):

@@ -21,7 +21,7 @@ from codebotler.simulator.worlds.matching import is_in_request, meant_by
 
 
 def unknown_rooms_in(rule: Rule, rooms: Sequence[str]) -> Iterator[str]:
-    """Yield a sentence for each room that a rule names but that is not in `rooms`; none if this is empty."""
+    """Yield an error message for each room in a rule that does not exist; none if `rooms` is empty."""
     if rule.any_room or not rooms:
         return
     poses = {pattern for one in rule.inside for pattern in patterns(one.text)}
@@ -44,7 +44,7 @@ def room_patterns(rule: Rule) -> Iterator[str]:
 
 
 def may_mean(pattern: str, labels: Iterable[str]) -> bool:
-    """Whether a regex may refer to one of the labels. True if it matches everything or nothing."""
+    """Whether a regex may mean one of the labels. Also True if it matches every text or none at all."""
     matches, texts = Regex(pattern).matches, samples(pattern)
     return (
         not texts
@@ -98,6 +98,6 @@ def _expect_all_names(rule: Rule, room: str, rooms: Sequence[str]) -> None:
         missed = [one for one in requests if not text.matches(name_of(room, one))]
         if missed and (len(missed) < len(requests) or text.matches(room)):
             raise UserError(
-                f'the rule "{rule.name}" does not cover "{missed[0]}", which also means the room "{room}"; '
-                "use a pattern that matches every name of the room"
+                f'the rule "{rule.name}" does not cover "{missed[0]}", another name of the room "{room}"; '
+                "use a pattern for all names of the room"
             )

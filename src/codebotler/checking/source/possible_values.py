@@ -30,7 +30,7 @@ PossibleValue: TypeAlias = ast.expr | None
 
 
 class PossibleValues:
-    """Finds which values an expression may have. It ignores the scopes of functions, and all order.
+    """Finds the values that an expression may have, without regard to scopes and the order of statements.
 
     Args:
         tree: the program.
@@ -63,11 +63,11 @@ class PossibleValues:
                 self._bind_parameters(node, self._functions.get(node.func.id))
 
     def variable(self, name: ast.Name) -> str:
-        """Return a variable's name, which differs between comprehensions, as each has its own."""
+        """Return a key for a variable: its name, with the position of the comprehension that binds it."""
         return self._own.get(name, name.id)
 
     def of(self, node: ast.expr) -> list[PossibleValue]:
-        """Return the expressions that may give a node its value: "hall" for `room` after `room = "hall"`."""
+        """Return the expressions that may be a node's value, such as "hall" for `room` (None: unknown)."""
         found: list[PossibleValue] = []
         seen: set[str | ast.expr] = set()
         waiting: list[PossibleValue] = [node]

@@ -23,7 +23,7 @@ EXAMPLE_PROGRAM = "def task_program():\n    if is_in_rom('mug'):\n        say('a
 
 
 def read_program(program: str, room_map: RoomMap, skills: SkillTable) -> tuple[bool, tuple[Problem, ...]]:
-    """Return whether a program compiles, and the errors that it will certainly have, one per line."""
+    """Return whether a program compiles, and the errors that it will certainly have, at most one per line."""
     try:
         compiles, problems = _findings(program, room_map, _without_functions(skills))
     except IsolatedCallError as error:

@@ -46,8 +46,8 @@ class WrittenArguments:
     """The texts that a program passes to its skills, as far as its source shows them.
 
     Args:
-        skills: the texts of each argument, by the skill's and the parameter's name. `ANY_TEXT` is among them
-            if there may be others.
+        skills: `skills["go_to"]["location"]` has the texts of this argument of `go_to`, and `ANY_TEXT` if
+            there may be others.
         reads_clock: whether the program may depend on the time of day or on random numbers.
     """
 
@@ -56,7 +56,7 @@ class WrittenArguments:
 
 
 def read_arguments(program: str, skills: SkillTable) -> WrittenArguments:
-    """Return the texts that a program passes to its skills: any text if its source cannot be read."""
+    """Return the texts that a program passes to its skills, or any text if its source cannot be read."""
     parameters = [(row.name, [one.name for one in row.parameters]) for row in skills.rows]
     try:
         found, reads_clock = _read(program, parameters)
@@ -122,7 +122,7 @@ class _Texts:
         self._reading: set[ast.expr] = set()  # expressions whose texts are being determined
 
     def given(self, skills: Mapping[str, list[str]]) -> dict[tuple[str, str], Templates]:
-        """Return the texts of each argument of each skill that the program names."""
+        """Return the texts of each argument, by skill and parameter. `skills` has each skill's parameters."""
         found: defaultdict[tuple[str, str], Templates] = defaultdict(lambda: NOTHING)
         called = set()
         for node in nodes(self._tree):
