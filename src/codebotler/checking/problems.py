@@ -170,11 +170,7 @@ class CheckResult:
         return frozenset(number for number in first if number is not None)
 
     def data(self, skills: SkillTable = SKILLS) -> dict[str, Any]:
-        """Convert the result to a dictionary for JSON. Equal results give equal dictionaries.
-
-        Args:
-            skills: the skills that the program could call.
-        """
+        """Convert the result to a dictionary for JSON. `skills` are those that the program could call."""
         return {
             "accepted": not self.problems,
             "problems": [

@@ -66,7 +66,7 @@ def generate(
         programs.print_prompt(make_prompt(instruction), chosen.name)
         return
     if candidates > 1 and (repair or retries is not None):
-        raise UserError("--candidates cannot be combined with --retries or --repair")
+        raise UserError("--candidates cannot be combined with --retries or --repair; leave out one")
     how = CheckSettings(skills=table, house_rules=house_rules)
     with suggesting_here(room_map):
         if candidates > 1:
@@ -150,7 +150,7 @@ def rules(
     skills: options.SkillsOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """Show house rules with examples, and likely mistakes.
+    """Show house rules with examples, and warn of likely mistakes.
 
     For each rule, it shows a short example that keeps the rule and one that breaks it.
     """
@@ -184,9 +184,9 @@ def replay(
     skills: options.SkillsOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """Measure which programs and logs house rules would stop.
+    """Show which programs and logs house rules would stop.
 
-    Each program runs once in simulation, without --world in an imagined world. Logs are only read.
+    Each program runs once, in the world of --world or in an imagined world. Logs are only read.
     """
     from codebotler.cli.programs.replay import find_replayed_files, replay, replay_data, replay_view
     from codebotler.cli.programs.rules import rules_for

@@ -75,9 +75,9 @@ def model_settings(
     seed: ModelSeedOption = None,
     timeout: TimeoutOption = SamplingSettings.timeout,
 ) -> SamplingSettings:
-    """Return a model's settings. Raise UserError if an option is invalid or contradicts another one."""
+    """Return the settings that these options give. Raise UserError if one is invalid or two contradict."""
     if settings not in {None, "paper"}:
-        raise UserError(f'unknown settings "{settings}"; use --settings paper, or leave it out')
+        raise UserError(f'unknown settings "{settings}"; use --settings paper, or leave out --settings')
     if settings is not None and max_tokens is None:  # the paper's temperature and top-p are the defaults
         max_tokens = PAPER_MAX_TOKENS
     return SamplingSettings(
@@ -94,7 +94,7 @@ def model_settings(
 def _choose(name: str, value: float | None, *, is_left_out: bool) -> float | None:
     option = name.replace("_", "-")
     if is_left_out and value is not None:
-        raise UserError(f"--{option} and --no-{option} cannot be used together")
+        raise UserError(f"--{option} and --no-{option} cannot be used together; leave out one")
     default: float = getattr(SamplingSettings, name)
     return None if is_left_out else default if value is None else value
 
@@ -105,12 +105,12 @@ def _json_object(text: str) -> dict[str, Any]:
     except (ValueError, RecursionError):
         value = None
     if not isinstance(value, dict):
-        raise UserError("--extra-body is not a JSON object; write one such as '{\"top_k\": 20}'")
+        raise UserError("the value of --extra-body is not a JSON object; write one such as '{\"top_k\": 20}'")
     return value
 
 
 def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
-    """Print a note about requested settings that are not sent because the model does not support them."""
+    """Print a note that names the requested settings, such as a seed, that the model does not support."""
     from codebotler.models.recorded import is_recorded
 
     names = ("temperature", "top_p", "seed")
@@ -120,7 +120,7 @@ def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
 
 
 def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], CommandT]:
-    """Return a decorator that adds the options of the function `called` to a command with `**shared`."""
+    """Return a decorator for a command with `**shared`, which adds the options of the function `called`."""
 
     def extended(command: CommandT) -> CommandT:
         inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
@@ -135,5 +135,5 @@ def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], Comma
 
 
 def options_for(called: Callable[..., object], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options in `given` that the function `called` accepts, by name."""
+    """Return those of the options `given`, by name, that are parameters of the function `called`."""
     return {name: given[name] for name in signature(called).parameters}

@@ -169,7 +169,7 @@ def robot_settings(
     within: WithinOption = None,
     skills: SkillsOption = None,
 ) -> RobotSettings:
-    """Read the world, rules, contract and other files of the options. Raise UserError if one is invalid."""
+    """Read the files that these options name, such as the world file. Raise UserError if one is invalid."""
     from codebotler.checking.house_rules.file import read_rules
     from codebotler.core.skills.files import skills_from
     from codebotler.robots.base import Options
@@ -186,7 +186,7 @@ def robot_settings(
 def read_connect_option(
     file: Path | None, robot: str | None, skills: SkillTable
 ) -> tuple[str, Connection | None]:
-    """Return the kind of robot, such as `sim`, and the connection in the --connect file, if given."""
+    """Return the kind of robot, such as `sim`, and the connection in the --connect file, or None."""
     if file is None:
         return robot or "sim", None
     from codebotler.robots.ros.connections.connection_file import read_connection
@@ -200,7 +200,7 @@ def read_connect_option(
 def read_world(
     robot: str, file: Path | None, skills: SkillTable, connection: Connection | None = None
 ) -> World | None:
-    """Read a world file. By default, return the places of the connection, the office of `sim`, or None."""
+    """Read a world file. Without one, return the connection's places, the example office (`sim`) or None."""
     from codebotler.core import world_file
     from codebotler.robots.simulated import OFFICE
 
@@ -211,7 +211,7 @@ def read_world(
 
 
 def read_within(file: Path | None, skills: SkillTable) -> Contract | None:
-    """Read the contract that programs must stay within, or return None without a file."""
+    """Read the contract that limits what programs may do, or return None if no file is given."""
     from codebotler.checking.contracts.file import read_contract
 
     return None if file is None else read_contract(file, skills)

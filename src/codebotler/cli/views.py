@@ -37,7 +37,7 @@ CLEAR_LINE = "\r\x1b[2K"
 
 
 class EventPrinter:
-    """Prints events as they happen. On a terminal, each event overwrites a line of feedback before it."""
+    """Prints a mission's events as they happen. On a terminal, the next event overwrites feedback."""
 
     def __init__(self, robot: str) -> None:
         self._console = console(highlight=False)
@@ -78,7 +78,7 @@ def _time_text(line: LogLine) -> str:
 
 
 def ending_view(ended: SessionView) -> Group:
-    """Return how a mission ended, and the command that shows it again, on a line that is never wrapped."""
+    """Return how a mission ended and, on a line that is never wrapped, the command that shows it again."""
     state = ended.state
     assert state is not None, "the mission has begun"
     text = Text.assemble((state, STATE_STYLES.get(state, "bold")), _why(ended))

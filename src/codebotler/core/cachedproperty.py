@@ -11,7 +11,7 @@ if TYPE_CHECKING or sys.version_info >= (3, 12):
 else:
 
     class cached_property:  # noqa: N801 - named as in functools
-        """A property that is computed on first access, or twice if two threads access it at the same time.
+        """A property that is computed on first access and then kept. Two threads may compute it at once.
 
         It has no lock, since the lock of functools is shared by all objects of a class. A process that forks
         while another thread holds that lock would deadlock.

@@ -45,7 +45,7 @@ class UserError(ValueError):
 
 
 def elide_middle(text: str, longest: int) -> str:
-    """Shorten a text to about `longest` characters: ` ... ` replaces its middle."""
+    """Return a text in which ` ... ` replaces the middle if it is longer than `longest` characters."""
     half = longest // 2
     return text if len(text) <= longest else f"{text[:half]} ... {text[-half:]}"
 
@@ -54,7 +54,7 @@ BadInput = UserError  # the former name, for one version
 
 
 def expect_list(given: Sequence[str] | None, what: str) -> None:
-    """Raise UserError if a list is a single string, as in `rooms="lobby"`; `what` names the argument."""
+    """Raise UserError if an argument, named `what`, is a string instead of a list: `rooms="lobby"`."""
     if isinstance(given, str):
         raise UserError(f"{what} must be a list, not the single string {given[:40]!r}")
 
@@ -95,7 +95,7 @@ class RobotError(Exception):
 
     @property
     def ends_run(self) -> bool:
-        """Whether the run ends even if the program catches the error."""
+        """Whether the run ends even if the program catches the error, as for most broken house rules."""
         return False
 
     def __reduce__(self) -> tuple[object, ...]:

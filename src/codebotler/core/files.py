@@ -38,9 +38,12 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def decode_text(data: bytes, name: Path | str, *, limit: int = MAX_FILE_BYTES) -> str:
-    """Decode UTF-8, normalize line endings and drop a byte order mark. Errors name the file `name`."""
+    """Decode UTF-8, normalize line endings and drop a byte order mark.
+
+    Raise UserError about the file `name` if the text is not UTF-8 or is longer than `limit` bytes.
+    """
     if len(data) > limit:
-        raise UserError(f"the text is larger than {limit:,} bytes", file=name)
+        raise UserError(f"the text is larger than {limit:,} bytes; shorten it", file=name)
     _expect_not_utf_16(data, name)
     try:
         return io.StringIO(data.decode("utf-8-sig"), newline=None).read()
@@ -82,7 +85,7 @@ def read_lines(path: Path, *, limit: int = MAX_ROW) -> Iterator[tuple[int, bytes
 
 
 def read_rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the line number and data of each row of a JSON Lines file. Skip a partial last row."""
+    """Yield the line number and data of each row of a JSON Lines file, without a partial last row."""
     for number, line in read_lines(path):
         if line.strip():
             try:
@@ -99,7 +102,7 @@ def read_rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
 def parse_row(line: bytes, example: str | None = None) -> dict[str, Any] | None:
     """Return the JSON object in a line, or None if the line is not JSON.
 
-    For other JSON, such as a list, raise UserError. Its sentence quotes `example`, a correct row.
+    Raise UserError for other JSON, such as a list. The message shows `example`, a correct row, if given.
     """
     try:
         row = json.loads(line)
@@ -112,12 +115,12 @@ def parse_row(line: bytes, example: str | None = None) -> dict[str, Any] | None:
 
 
 def to_line(row: object) -> bytes:
-    """Encode a row as a line of JSON in UTF-8, with lone surrogates as JSON escapes."""
+    """Encode a row as a line of JSON in UTF-8. Lone surrogates, which UTF-8 lacks, become JSON escapes."""
     return json.dumps(row, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
 
 
 def to_text(data: dict[str, Any]) -> bytes:
-    """Encode data as indented JSON, which is easy to read."""
+    """Encode data as indented JSON in UTF-8, for files that people read."""
     return json.dumps(data, indent=2, ensure_ascii=False).encode() + b"\n"
 
 
@@ -144,7 +147,7 @@ class Appender:
             raise
 
     def append(self, line: bytes) -> None:
-        """Append a line completely or not at all. Raise OSError if the disk is full."""
+        """Append a line, with its line break, completely or not at all. Raise OSError if the disk is full."""
         descriptor = self._file.fileno()
         start = os.fstat(descriptor).st_size
         with name_in_errors(self.path):
@@ -181,7 +184,7 @@ def _intact_length(path: Path) -> int:
 
 @contextmanager
 def name_in_errors(path: Path) -> Iterator[None]:
-    """In a `with` block, add a file's name to each OSError, which often lacks it."""
+    """In a `with` block, make each OSError name the file, since Python often leaves the name out."""
     try:
         yield
     except OSError as error:
@@ -198,7 +201,7 @@ def write_whole(path: Path, content: bytes | memoryview) -> None:
 
 @contextmanager
 def open_replacement(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
-    """Open a temporary file that atomically replaces `path` if the `with` block ends without an error."""
+    """Open a file that replaces `path` when the `with` block ends without error; `temporary` until then."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = temporary or path.with_name(path.name + ".new")
     try:
@@ -234,7 +237,7 @@ def expect_replaceable(path: Path, *beginnings: bytes) -> None:
         with path.open("rb") as file:
             start = file.read(max(map(len, beginnings)))
         if start and not start.startswith(beginnings):
-            raise UserError("this file has unexpected content; remove it or write to another file", file=path)
+            raise UserError("unexpected content is not overwritten; remove or rename this file", file=path)
 
 
 # --- the state folder
@@ -265,8 +268,8 @@ def _user_folder(variable: str, default: str) -> Path | None:
 
 
 def make_folder(folder: Path) -> None:
-    """Create a folder if it is missing, and raise UserError if it is not writable."""
+    """Create a folder if it is missing. Raise UserError if nothing can be written into the folder."""
     with suppress(PermissionError):
         folder.mkdir(parents=True, exist_ok=True)
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=True):
-        raise UserError("this folder is not writable; set CODEBOTLER_HOME to another", file=folder)
+        raise UserError("this folder is not writable; set CODEBOTLER_HOME to another folder", file=folder)

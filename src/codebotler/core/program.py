@@ -70,7 +70,7 @@ class Program:
 
 @lru_cache(maxsize=8)
 def parse(source: str) -> ast.Module:
-    """Parse a program, or raise an error of `ast.parse`. Callers share the cached tree: do not change it."""
+    """Parse a program, or raise an error of `ast.parse`. Do not change the tree, which callers share."""
     _expect_short_rows(source)
     with _PARSING:
         return ast.parse(compose(source), SOURCE_NAME)
@@ -93,7 +93,7 @@ def _expect_short_rows(source: str) -> None:
     """Raise SyntaxError if a letter has too many accents, since `ast.parse` normalizes names, too."""
     for start, _ in long_rows(source):
         line = source.count("\n", 0, start) + 1
-        raise SyntaxError(f"more than {MAX_ACCENTS} accents in a row", (SOURCE_NAME, line, None, None))
+        raise SyntaxError(f"more than {MAX_ACCENTS} accents on one letter", (SOURCE_NAME, line, None, None))
 
 
 def parse_program(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
@@ -138,7 +138,7 @@ def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, booleans, 
             return ast.literal_eval(node)
     except (TypeError, SyntaxError, MemoryError, RecursionError) as error:
         raise ValueError(str(error)) from None
-    raise ValueError("a dictionary or a set is not allowed")
+    raise ValueError("a value with a dictionary or a set is not allowed")
 
 
 def parse_leniently(source: str) -> ast.Module:
@@ -175,10 +175,7 @@ def _bound_in_module(source: str) -> set[str]:
 
 
 def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
-    """Return the names that a program binds in any scope, with `*` for `from x import *`.
-
-    Skip the nodes in `ignoring`.
-    """
+    """Return the names that a program binds in any scope (`*`: `from x import *`), except in `ignoring`."""
     names: set[str] = set()
     skipped = {id(node) for node in ignoring}
     for node in nodes(tree):
@@ -197,7 +194,7 @@ def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[s
 
 
 def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, int]:
-    """Return the line of the first use of each skill in a program, by its name. Omit redefined skills."""
+    """Return the line where each skill is first used, by its name, without skills that are redefined."""
     rebound = all_bound_names(tree)
     lines: dict[str, int] = {}
     for node in nodes(tree):
@@ -207,13 +204,13 @@ def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, in
 
 
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
-    """Return the line of each undefined name, the name, and whether it is a local variable used too early."""
+    """Return the line and the name of each undefined name, and whether it is a local variable used early."""
     from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - takes a tenth of a second
     from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - slow
 
     class NameChecker(Checker):  # type: ignore[misc]  # pyflakes has no types
         def handleStringAnnotation(self, *_: object) -> None:  # noqa: N802 - a method of pyflakes
-            """Skip names in string annotations, which are never looked up at run time."""
+            """Report no names in string annotations, since Python never looks them up."""
 
     with _PARSING:
         found = NameChecker(tree, builtins={*skills, *GIVEN_MODULES}, withDoctest=False).messages

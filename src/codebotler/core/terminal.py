@@ -56,7 +56,7 @@ def _note_error(error: BaseException | None) -> None:
 
 
 def open_streams() -> None:
-    """Open each standard stream that is closed as /dev/null, so that no other file gets its descriptor."""
+    """Open /dev/null for each closed standard stream, so that no other file gets its descriptor."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
@@ -114,7 +114,7 @@ def print_rich(what: RenderableType) -> None:
 
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
-    """Show a spinner, the elapsed time and a text such as `asking the model` until the `with` block ends."""
+    """During a `with` block, show a spinner, the elapsed time and a text such as `asking the model`."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     with progress(SpinnerColumn(), TextColumn(doing, markup=False), TimeElapsedColumn()) as shown:

@@ -27,7 +27,7 @@ class Option(NamedTuple):
 
 
 def to_options(values: Iterable[object]) -> tuple[Option, ...]:
-    """Convert the options of a question to `Option` values; those that are `Option` already stay so."""
+    """Convert a question's options, such as texts or numbers, to `Option`. Keep those that are `Option`."""
     return tuple(
         [one if isinstance(one, Option) else Option(str(one), isinstance(one, str)) for one in values]
     )
@@ -74,7 +74,7 @@ def attempted_event(
     time: float,
     holding: str = "",
 ) -> Event | None:
-    """Return the event of a skill call, such as `Event("goto", "kitchen")`, or None if it is not recorded."""
+    """Return a call's event before its result, such as `Event("goto", "kitchen")`; None if not recorded."""
     if skill.recording is None:
         return None
     row, given = skill.recording, dict(zip((p.name for p in skill.parameters), arguments, strict=True))
@@ -102,7 +102,7 @@ Trace: TypeAlias = tuple[Event, ...]
 
 
 class Status(StrEnum):
-    """How a run ended."""
+    """How a run ended: it finished, reached a limit, failed with an error, or was killed."""
 
     FINISHED = "finished"
     TIMEOUT = "timeout"

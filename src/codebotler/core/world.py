@@ -25,7 +25,7 @@ Answer: TypeAlias = str | int
 
 @dataclass(frozen=True)
 class Person:
-    """A person in a room who answers questions."""
+    """A person in a room, with scripted answers to the robot's questions."""
 
     name: str  # a regex that matches their names
     answers: tuple[Answer, ...] = ()  # one per question; the last one repeats; if empty, questions fail
@@ -46,7 +46,7 @@ class Room:
         objects: the labels of its objects, in order.
         people: the people in it, in order.
         footprint: the positions of its corners in metres; None if unknown.
-        stand_at: the point where the robot stops, in metres.
+        stand_at: the point where the robot stops, in metres; None if unknown.
         within: the room that contains it if it is a place inside a room, such as a table, else empty.
     """
 
@@ -75,8 +75,8 @@ class World:
         robot: the room where the robot starts.
         about: a short description.
         may_wait_forever: whether a program may wait in this world for something that never happens.
-        truths: calls of own skills and what they return, such as `("read_gauge("boiler")", 3)`.
-        traits: the properties of things and people, such as `("apple", (Trait("kind", "fruit"),))`.
+        truths: statements and calls of own skills with their values, such as `('read_gauge("boiler")', 3)`.
+        traits: the properties of things and people, such as `("apple", (("kind", "fruit"),))`.
     """
 
     rooms: tuple[Room, ...]
@@ -91,7 +91,7 @@ class World:
 
     @property
     def descriptions(self) -> list[str]:
-        """The texts that describe its things and people, such as `fruit` or `red coat`."""
+        """The texts in the properties of its things and people, such as `fruit` or `red coat`."""
         values = [value for _, traits in self.traits for _, value in traits]
         lists = [one if isinstance(one, tuple) else (one,) for one in values]
         return [text for texts in lists for text in texts if isinstance(text, str)]
@@ -187,7 +187,7 @@ def is_within(point: Point, corners: Sequence[Point]) -> bool:
 
 
 def rooms_along(rooms: Iterable[Room], start: Point, end: Point) -> Iterator[tuple[str, ...]]:
-    """Cut a straight path where it enters or leaves a room, and yield the names of the rooms of each part."""
+    """Cut a straight path where it enters or leaves a room. For each part, yield the rooms it is in."""
     here, way = complex(*start), complex(*end) - complex(*start) or MIN_PART
     edges = {}  # for each room, the fractions of the path at which the path crosses its edges
     for room in rooms:

@@ -111,7 +111,7 @@ ThingFile: TypeAlias = Annotated[_Described, MAY_BE_NAME]
 
 
 class PersonFile(_Described):
-    """A person in a world file."""
+    """A person in a world file, with scripted answers and perhaps properties."""
 
     answers: list[AnswerFile] = []
     topics: dict[NamePattern, AnswerFile] = {}
@@ -130,7 +130,7 @@ def _answer(form: AnswerFile) -> Answer:
 
 
 class PlaceFile(_Form):
-    """A place in a world file, such as a table: a name, alone or with geometry."""
+    """A place in a world file, such as a table: a name, perhaps with corners and a standing point."""
 
     name: NamePattern
     footprint: Annotated[list[Corner], Field(min_length=3)] | None = None
@@ -144,7 +144,7 @@ class RoomFile(PlaceFile):
 
 
 class WorldFile(_Form):
-    """The content of a world file, or of a world inside a task file."""
+    """The content of a world file or of a world in a task file: rooms, things, people and truths."""
 
     about: YamlText = ""
     robot: Name
@@ -257,11 +257,11 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
     """Raise ValueError if a call cannot return this value, or if the skill's code computes its result."""
     row = skills.get(name)
     if row is None or not row.is_random:
-        raise ValueError(f"{name} is not a skill with an empty body; set what its result depends on")
+        raise ValueError(f"{name} is not a skill with an empty body; set the facts that its function reads")
     if len(given) != len(row.parameters) or not all(
         parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)
     ):
-        raise ValueError(f"the arguments of {name} are wrong; its signature is {row.signature}")
+        raise ValueError(f"the arguments of {name} do not fit; its signature is {row.signature}")
     kinds = [kind for kind, _ in row.fails]
     if value in kinds or (row.returns.base is not None and row.returns.fits(value)):
         return

@@ -105,7 +105,7 @@ class YamlFile:
         return self._lines[path]
 
     def part(self, key: str, data: object) -> YamlFile:
-        """Return the part of this file under a key as a YamlFile, whose errors have the same line numbers.
+        """Return the part of this file under a key as a YamlFile. Its errors give lines of the whole file.
 
         Args:
             key: a key of the file.
@@ -123,7 +123,7 @@ class YamlFile:
     def validate(self, model: type[FileModel], data: object = None, *, at: YamlPath = ()) -> FileModel:
         """Convert the content to a pydantic model, or raise UserError with the line of a mistake.
 
-        If `data` is given, convert it instead; it is the value of the part at `at`.
+        If `data` is given, convert these data instead, which are at the path `at` in the file.
         """
         try:
             return model.model_validate(self.data if data is None and not at else data)
@@ -154,7 +154,7 @@ class YamlFile:
     def _remember(self, node: yaml.Node, place: YamlPath) -> None:
         self._lines[place] = node.start_mark.line + 1
         if len(place) > MAX_DEPTH or len(self._lines) > MAX_PLACES:
-            raise _fault("the text is nested too deeply, or its anchors repeat too much", node)
+            raise _fault("the text is nested too deeply or repeats too many anchors; simplify the file", node)
         if isinstance(node, yaml.SequenceNode):
             for index, item in enumerate(node.value):
                 self._remember(item, (*place, index))

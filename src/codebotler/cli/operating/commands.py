@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class RunSettings(NamedTuple):
-    """Two functions for `run` and `continue`, with the values of their shared options already filled in."""
+    """For `run` and `continue`: how to make a request and a console, with their shared options filled in."""
 
     request: Callable[..., Request]  # takes the other fields of a request
     open_console: Callable[..., Console]
@@ -35,7 +35,7 @@ def run_settings(
     recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> RunSettings:
-    """Return functions for `run` and `continue` with the values of their shared options, such as --model."""
+    """Return what `run` and `continue` need to make a request and a console with these shared options."""
     from functools import partial
 
     from codebotler.cli.operating.run import Request
@@ -183,7 +183,7 @@ def connect(
     from codebotler.robots.ros.connections.discovery import discover_offers, draft_connection
 
     if not discover:
-        raise UserError("add --discover, which explores the robot and drafts a file for --connect")
+        raise UserError("add --discover to explore the robot and draft a file for --connect")
     with busy("exploring the robot"):
         text = draft_connection(discover_offers(address, ros_python))
     if out is None:

@@ -123,7 +123,7 @@ def run(console: Console, request: Request) -> int:
         print_rich(past_view(past))
         note(f"recovering: asking {order.model} for the rest of the mission")
         request = replace(request, despite_problems=False)  # accepted for the first program only
-    raise AssertionError("the last mission has no rest")
+    raise AssertionError("the last round returns a status; this is a bug")
 
 
 def _carry_out(
@@ -216,7 +216,7 @@ def _watched(
 
 
 def end_at_signals() -> None:
-    """Let SIGTERM and a closed terminal end this process in order from now on, as Ctrl-C does."""
+    """From now on, let SIGTERM and SIGHUP (a closed terminal) end this process cleanly, as Ctrl-C does."""
 
     def end(number: int, _frame: object) -> NoReturn:
         raise SystemExit(SIGNAL_EXIT_BASE + number)
@@ -256,9 +256,9 @@ def choose_past(console: Console, name: str, program: str) -> MissionPast:
     """Read what a mission did, show it, and ask a person about a step that may have happened or not.
 
     Args:
-        console: the console with the robot. If a step is unsure, the robot is asked where it is.
+        console: the console with the robot. Before a question about a step, the robot is asked where it is.
         name: the ID of the mission, or `last`.
-        program: the file with the rest; `-` means standard input, which then cannot hold answers.
+        program: the file with a program for the rest; `-` for standard input, empty if a model writes it.
 
     Raises:
         UserError: there is no such mission, it cannot be continued, it has no instruction and no
@@ -273,7 +273,7 @@ def choose_past(console: Console, name: str, program: str) -> MissionPast:
         return past
     if program == "-":
         raise UserError(
-            f"{past.unsure_step_text}; name a program file instead of `-`, since a person must answer here"
+            f"{past.unsure_step_text}; name a program file instead of `-`, so that you can answer y or n here"
         )
     evidence = [past.unsure_step_text]
     # On a thread, so that a signal ends the command meanwhile, and the end of the console stops the robot.
@@ -300,7 +300,7 @@ def _ask_whether(past: MissionPast) -> bool:
         if word in {"y", "yes", "n", "no"}:
             return word.startswith("y")
         note("answer y or n, or press Ctrl-C to end here")
-    raise UserError(f"{past.unsure_step_text}; a person must answer y or n")
+    raise UserError(f"{past.unsure_step_text}; run this command again and answer y or n")
 
 
 def past_view(past: MissionPast) -> Group:

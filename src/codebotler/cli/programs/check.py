@@ -43,7 +43,7 @@ def read_program(name: str) -> str:
 
 
 def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool = False) -> RenderableType:
-    """Return the verdict, the problems and a run in a sampled world, or all different runs (`shows_all`)."""
+    """Return a check for printing: verdict, problems, and one run or, if `shows_all`, all different runs."""
     parts: list[RenderableType] = [_verdict(found, name)]
     lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
@@ -128,7 +128,7 @@ def _sample(sample: Sample) -> Iterator[RenderableType]:
 
 
 def contract_view(contract: Contract, skills: SkillTable) -> Group:
-    """Return what a program may do at most: a sentence or two, and a table with a row for each skill."""
+    """Return a contract for printing: a sentence or two, and a table with a row for each skill."""
     sentence = contract_sentence(contract, skills, shortened)
     head = Text.assemble(("\nwhat it may do at most", "bold"), f"\n{sentence}\n")
     table = grid("left", "left", "left")

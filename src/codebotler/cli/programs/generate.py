@@ -74,7 +74,7 @@ def _note_attempt(attempt: Attempt, most: int) -> None:
 
 
 def note_programless(none: ProgramlessReply, which: str = "") -> None:
-    """Print a note about why a reply contains no program, and quote the reply."""
+    """Print why a reply contains no program, with `which` in front, and quote the reply."""
     hint = "" if none.higher_limit is None else f" --max-tokens {none.higher_limit} raises the limit."
     note(f"{which}{visible(none.sentence)}{hint}")
     if none.kind != "refusal" and none.text.strip():
@@ -104,7 +104,7 @@ def choose_candidate(
 ) -> str | None:
     """Get several programs from a model. Return the one that a person chooses, or None if there is none.
 
-    If the person first wants none of them, a sentence added to the instruction begins a second round.
+    If the person wants none of them, they may add a sentence to the instruction for a second round.
 
     Args:
         opener: opens the model.
@@ -113,7 +113,7 @@ def choose_candidate(
         settings: the settings for runs in imagined worlds.
         room_map: the rooms; by default those that the programs name.
         count: how many programs to request.
-        ask: asks the person for a line, which is empty at the end; None takes the most frequent behaviour.
+        ask: asks a question and returns the typed line; if None, the most frequent behaviour is taken.
 
     Raises:
         UserError: all programs of the second round do what the person did not mean.
@@ -176,7 +176,7 @@ def ask_which(question: ClarifyingQuestion, read_line: Callable[[str], str]) -> 
     while True:
         line = read_line(f'Answer {numbers}, "none" or "you decide": ')
         if not line:
-            raise UserError("no answer was given; `you decide` takes the first option")
+            raise UserError("no answer was given; answer `you decide` to take the first option")
         try:
             return question.parse(line)
         except UserError as error:

@@ -27,7 +27,7 @@ NO_EFFECT = "not at all"
 
 
 def find_replayed_files(paths: Sequence[Path]) -> list[Path]:
-    """Find programs, logs and missions in files and folders. Raise UserError if a path has none."""
+    """Return the programs, logs and missions in files and folders. Raise UserError if a path has none."""
     found: list[Path] = []
     for path in paths:
         if not path.exists():
@@ -35,7 +35,7 @@ def find_replayed_files(paths: Sequence[Path]) -> list[Path]:
         parts = sorted(path.iterdir()) if path.is_dir() and not _is_replayed(path) else [path]
         files = list(filter(_is_replayed, parts))
         if not files:
-            raise UserError("there is no program (.py), log (.jsonl) or mission here", file=path)
+            raise UserError("no program (.py), log (.jsonl) or mission found; name another path", file=path)
         found += files
     return found
 

@@ -31,7 +31,7 @@ WHEN_WORDS = {
 
 
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
-    """Read a rules file, if given, and warn if programs can evade a rule. Raise UserError if invalid."""
+    """Read a rules file, if given, and print a warning if a rule can be evaded. Raise UserError if wrong."""
     rules = () if path is None else read_rules(path, skills, rooms_of(world))
     for sentence in find_evasions(rules, rooms_of(world), skills):
         note(sentence)
@@ -83,7 +83,7 @@ def is_drive(event: Event) -> bool:
 
 
 def step_sentence(event: Event, room: str = "") -> str:
-    """Return a step in words: `drives to "kitchen" from office`, but without `from ...` if that is `room`."""
+    """Return a step in words: `drives to "kitchen" from office`, without `from office` if that is `room`."""
 
     def show(text: str) -> str:
         return "…" if text in ANY_ARGUMENT else visible(text)

@@ -15,7 +15,7 @@ SKILL_FAILED = "SkillFailed"
 
 
 def call_skill(row: Skill, robot: object, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - the declared type
-    """Call a custom skill's function. Raise RobotError if it fails, or UserError if its result is wrong."""
+    """Return a custom skill's result. Raise RobotError if it fails, or UserError if its result is wrong."""
     assert row.does is not None, "a custom skill has a function"
     given = [
         [option.text for option in argument] if parameter.is_options else parameter.type.convert(argument)

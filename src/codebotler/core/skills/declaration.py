@@ -48,7 +48,7 @@ USABLE = "str, int, float, bool, Literal, an Enum of texts or of numbers, or a l
 
 
 def by_name(name: str) -> Skill | None:
-    """Return the skill that this process has declared under a name, or None."""
+    """Return the skill with this name, or None if this process has not declared one."""
     return _DECLARED.get(name)
 
 
@@ -58,7 +58,7 @@ def all_names() -> list[str]:
 
 
 def by_event(kind: str) -> Skill | None:
-    """Return the skill of this process that records a kind of event, such as `go_to` for `goto`, or None."""
+    """Return the skill that records a kind of event, such as `go_to` for `goto`, or None if there is none."""
     other = POSE_IN_ROOM if kind == INSIDE else None
     return next((row for row in _DECLARED.values() if row.recording and row.recording.kind == kind), other)
 
@@ -103,7 +103,7 @@ class _Declaration:
         self.name = does.__name__
 
     def skill(self) -> Skill:
-        """Create and register the skill."""
+        """Create the skill and register it by its name, or raise UserError if the declaration is wrong."""
         self.check_options()
         self.check_name()
         parameters, returns = self.parameters(), self.returns()
@@ -192,7 +192,7 @@ class _Declaration:
         return found
 
     def annotation(self, name: str) -> object:
-        """Return an annotation, evaluated if it is a string. The simulation's may be an undefined name."""
+        """Return the annotation of a parameter or of `return`, evaluated if the file has it as a string."""
         annotation: object = self.does.__annotations__.get(name)
         if not isinstance(annotation, str):
             return annotation

@@ -40,7 +40,7 @@ def _declared_skills(path: Path) -> list[Skill]:
 
 
 def files_of(skills: SkillTable) -> dict[str, str]:
-    """Return the SHA-256 hash, in hexadecimal, of each file that declares skills of a table, by file name."""
+    """Return the SHA-256 hash (in hexadecimal) of each file with skills of the table, by the file's name."""
     modules = {getattr(row.does, "__module__", "") for row in skills.rows}
     paths = {Path(location_of(name)) for name in modules if is_own_module(name)}
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in sorted(paths)}

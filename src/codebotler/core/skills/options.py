@@ -10,7 +10,7 @@ from codebotler.core.skills.verbs import Verb
 
 
 class SkillOptions(TypedDict, total=False):
-    """The options of `@skill`, with their defaults in brackets."""
+    """The options of `@skill`, all optional, such as its verb, its errors, its event and its ROS action."""
 
     verb: Verb | str | None  # the English verb, such as `open {door}`, with parameters in braces [none]
     past: str  # the past form of an irregular verb that is not in the list, such as `wove`
@@ -31,7 +31,7 @@ class SkillOptions(TypedDict, total=False):
 
 
 def wrong_options(options: Mapping[str, Any]) -> Iterator[str]:
-    """Yield a sentence for each option that does not exist or whose value has the wrong type."""
+    """Yield an error message for each option that does not exist or whose value has the wrong type."""
     from pydantic import ConfigDict, TypeAdapter, ValidationError  # noqa: PLC0415 - slow, and the paper's skills need none
 
     types = get_type_hints(SkillOptions)

@@ -52,11 +52,11 @@ def load_own_module(path: Path) -> ModuleType:
 
 
 def location_of(module: str) -> str:
-    """Return the `place` of a module for `find_object`: the path of a custom skill file, else its name."""
+    """Return where `find_object` finds a module: the path of a custom skill file, or else a module's name."""
     return str(sys.modules[module].__file__) if is_own_module(module) else module
 
 
 def find_object(place: str, name: str) -> object:
-    """Import the module that `location_of` has located at `place`, and return its object named `name`."""
+    """Return the object `name` of a module, which is imported from `place` (see `location_of`)."""
     module = load_own_module(Path(place)) if place.endswith(".py") else import_module(place)
     return getattr(module, name)

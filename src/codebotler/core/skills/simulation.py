@@ -7,7 +7,7 @@ from typing import Any, NoReturn, Protocol
 
 
 class Simulation(Protocol):
-    """A robot in a simulated world. A method raises RobotError if its action fails."""
+    """A simulated robot, for the functions of skills. A method raises RobotError if its action fails."""
 
     @property
     def room(self) -> str:
@@ -40,13 +40,13 @@ class Simulation(Protocol):
         """A dictionary in which skills keep data during a run, such as which doors are open."""
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - the skill's type
-        """Return the result of a skill with an empty body, from `truths` or at random, or raise its error."""
+        """Return the result of a skill with an empty body, from `truths` or random, or raise its error."""
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
         """Return the names of all things, or of some: `things("kitchen", "fruit")` for fruit in a kitchen."""
 
     def people(self, where: str = "", is_: str = "", **traits: str) -> list[str]:
-        """Return the names of all people, or of some: `people("lobby", wears="red coat")`."""
+        """Return the names of all people, or of some: `people("lobby", "doctor", wears="red coat")`."""
 
     def traits(self, name: str) -> Mapping[str, Any]:
         """Return the properties of a thing or person, such as `{"wears": "red coat"}`."""

@@ -16,7 +16,7 @@ from codebotler.core.skills.verbs import Verb
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a skill."""
+    """A parameter of a skill, with its name and the type of its values."""
 
     name: str
     type: ValueType = TEXT_TYPE
@@ -65,7 +65,7 @@ ROS_PACKAGE = "robot_actions_pkg"
 
 @dataclass(frozen=True)
 class RosAction:
-    """The ROS action of a skill (paper, section III.C)."""
+    """The ROS action that executes a skill, with its topic and its fields (paper, section III.C)."""
 
     type: str
     server: str  # the topic under which the robot offers it

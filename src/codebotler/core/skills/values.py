@@ -116,7 +116,7 @@ def plain(value: Any) -> Any:  # noqa: ANN401 - any of these types
 
 
 def value_type(annotation: object) -> ValueType | None:
-    """Return the type for an annotation, or None if skills cannot use it."""
+    """Return the type for an annotation such as `list[str]`, or None if skills cannot use it."""
     if annotation is None or annotation is type(None):
         return NO_VALUE
     if isinstance(annotation, type | NewType) and annotation in SINGLE_TYPES:
@@ -140,7 +140,7 @@ def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueTy
 
 
 def sample_values(value: ValueType, names: Sequence[str] = ()) -> tuple[Any, ...]:
-    """Return values of a type from which a random result can be chosen. Texts come from `names`, if given."""
+    """Return a few values of a type, from which to choose a random result. Texts are `names`, if given."""
     if value.is_list:
         some = sample_values(replace(value, is_list=False), names)
         return [some[0]], [], [some[0], some[-1]]

@@ -35,7 +35,7 @@ VerbForm: TypeAlias = Literal["base", "third", "past", "ing"]
 
 @dataclass(frozen=True)
 class Verb:
-    """The English verb of a skill. The event's text follows it or fills the braces in `object`."""
+    """The English verb of a skill, such as `pick up`, in all forms that descriptions of events need."""
 
     base: str  # `pick up`
     third: str  # `picks up`
@@ -46,7 +46,7 @@ class Verb:
     object: str = ""  # `{} ml of {} into {}`, used for several texts
 
     def with_object(self, form: str, arguments: Sequence[str], quote: str = '"') -> str:
-        """Add texts to a verb form: `opened "door"` or, with `object`, `poured 5 ml of tea into cup`."""
+        """Add arguments to a form of the verb: `opened "door"`, or with `object`: `poured 5 ml into cup`."""
         if not self.object:
             return " ".join([form, *(f"{quote}{text}{quote}" for text in arguments)])
         missing = ["something"] * (self.object.count("{") - len(arguments))
@@ -54,7 +54,7 @@ class Verb:
 
 
 def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], past: str = "") -> Verb:
-    """Build a verb from a template such as `open {door}`, and the words for the results False and True.
+    """Build a verb from a template such as `open {door}`. `results` are words for False and True.
 
     Raises:
         ValueError: the template has no verb, or braces around something other than a parameter.

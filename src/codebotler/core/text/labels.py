@@ -28,7 +28,7 @@ UNSUPPORTED_OPCODES = frozenset({"GROUPREF", "GROUPREF_EXISTS"})
 
 
 def plain_names(labels: Iterable[str]) -> tuple[str, ...]:
-    """Return the labels without special characters of regexes, such as `mug` but not `mug|cup`, each once."""
+    """Return only the labels that are plain texts, such as `mug`, not regexes such as `mug|cup`."""
     return tuple(dict.fromkeys(filter(PLAIN_LABEL.fullmatch, labels)))
 
 
@@ -37,14 +37,14 @@ class SlowRegexError(Exception):
 
 
 def check_label(text: str) -> str:
-    """Return a label unchanged, or raise ValueError if it is not a regex or may be slow to search."""
+    """Return a regex unchanged, or raise ValueError if it is not valid or if a search for it may be slow."""
     if PLAIN_LABEL.fullmatch(text):
         return text
     check_regex(text)
     try:
         expect_quick(text)
     except SlowRegexError as error:
-        raise ValueError(f"searching for it may take too long: {error}") from None
+        raise ValueError(f"searching for this text may take too long: {error}") from None
     return text
 
 
@@ -54,12 +54,12 @@ def check_regex(text: str) -> str:
         re.compile(text)
         re.compile(f"(?:{scope_flags(text)})")  # patterns for whole words wrap it like this
     except (re.error, RecursionError, OverflowError) as error:
-        raise ValueError(f"it is not a valid regular expression: {error}") from None
+        raise ValueError(f"this text is not a valid regular expression: {error}") from None
     return text
 
 
 def scope_flags(pattern: str) -> str:
-    """Limit the flags of a regex to a group, so that others can contain it: `(?i)tea` becomes `(?i:tea)`."""
+    """Put a regex with flags into a group, so that it can be part of another: `(?i)tea` gives `(?i:tea)`."""
     found = LEADING_FLAGS.match(pattern)
     if found is None:
         return pattern
@@ -69,15 +69,15 @@ def scope_flags(pattern: str) -> str:
 
 @lru_cache(maxsize=1024)
 def expect_quick(pattern: str) -> None:
-    """Raise SlowRegexError if a search for a regex may be slow, by the rule at the top of this module."""
+    """Raise SlowRegexError if a search for a regex may be slow because of its repetitions or alternatives."""
     if pattern != ANY_LABEL:
         pattern = pattern.removeprefix(ANY_LABEL)
         pattern = pattern if pattern.endswith("\\.*") else pattern.removesuffix(ANY_LABEL)
     ways, endless = _cost(import_module("re._parser").parse(pattern))
     if endless > 1:
-        raise SlowRegexError("two repetitions are unlimited; limit them, as in .{0,50}")
+        raise SlowRegexError("the regex has two repetitions without a limit; limit them, as in .{0,50}")
     if ways > (MAX_WAYS_BESIDE_ENDLESS if endless else MAX_WAYS):
-        raise SlowRegexError("a text can match in too many ways; use fewer repetitions and alternatives")
+        raise SlowRegexError("the regex matches in too many ways; use fewer repetitions and alternatives")
 
 
 def _cost(tree: Any) -> tuple[int, int]:  # noqa: ANN401 - private classes of `re`

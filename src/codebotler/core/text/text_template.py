@@ -33,7 +33,7 @@ class TextTemplate:
 
     def __post_init__(self) -> None:
         if not self.parts:
-            raise ValueError("a text template has at least one part")
+            raise ValueError("a text template needs at least one part")
         first, *rest = self.parts
         parts = (first, *filter(None, rest[:-1]), *rest[-1:])
         is_long = len(parts) > MAX_PIECES or sum(map(len, parts)) > MAX_TEMPLATE_LENGTH
@@ -43,12 +43,12 @@ class TextTemplate:
 
     @property
     def is_any(self) -> bool:
-        """Whether every text matches."""
+        """Whether every text matches this template."""
         return len(self.parts) > 1 and not any(map(str.strip, self._pieces))
 
     @cached_property
     def joined(self) -> str:
-        """The template as it is compared with texts: normalized, in lower case, with U+D800 for each hole."""
+        """The template as a text for comparisons: normalized, in lower case, with U+D800 for each hole."""
         return _comparable(_HOLE.join(self.parts))
 
     @cached_property

@@ -37,10 +37,10 @@ def compose_fields(frozen: object) -> None:
 
 
 def normalize_text(form: Literal["NFC", "NFD"], text: str) -> str:
-    """Normalize a text, but keep rows of more than 30 accents as they are.
+    """Normalize a text, but leave letters with more than 30 accents unchanged.
 
-    Python sorts a row of accents in quadratic time, and no other thread, such as the one for STOP, can run
-    meanwhile.
+    Python sorts the accents of a letter in quadratic time, and no other thread, such as the one for STOP, can
+    run meanwhile.
     """
     parts, end = [], 0
     for start, after in long_rows(text):
