@@ -129,7 +129,7 @@ def _read_file(home: Path, mission: str, name: str) -> str:
 
 
 def over_http(server: MCPServer[Gatekeeper], announce: Callable[[str], None]) -> Companion:
-    """Return a server for agents at `/mcp` on the page's port. `announce` is called with its address."""
+    """Return a server for agents at `/mcp` on the page's port; `announce` receives the page's address."""
     security = TransportSecuritySettings(enable_dns_rebinding_protection=False)  # the page's guard has it
     (route,) = server.streamable_http_app(
         streamable_http_path=AGENT_PATH, transport_security=security, max_sessions=MAX_SESSIONS

@@ -161,7 +161,8 @@ def cluster_candidates(
     for number in _wanted(behaviours, len(accepted)) or _wanted(texts, len(accepted)):
         together.setdefault(behaviours[number], []).append(number)
     if not together:
-        raise UserError("all new programs do what you rejected before; give the instruction in other words")
+        again = counted(len(programs) - len(rejected), "program")
+        raise UserError(f"{again} would do what you rejected before; give the instruction in other words")
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     people = frozenset(map(normalized, rooms.people))
     conflicts = [*map(bool, conflicts_in_worlds(clusters, people).values())]

@@ -140,11 +140,7 @@ class ClarifyingQuestion:
         return [f"{who}{self.supposition}: a robot that {option.difference}", *rest]
 
     def parse(self, line: str) -> ClarifyingAnswer:
-        """Read a person's answer: the number of an option from 1, `none`, or `you decide`.
-
-        Raises:
-            UserError: the line is none of these.
-        """
+        """Read an answer: an option's number from 1, `none` or `you decide`. Raise UserError for others."""
         text = " ".join(line.lower().split()).rstrip(".")
         if text.isdecimal() and 1 <= int(text) <= len(self.options):
             return int(text) - 1

@@ -48,7 +48,7 @@ def event_from_step(step: Mapping[str, Any]) -> Event:
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
-    """Return a table of steps, room by room, shortened if long. Step numbers in `needed` are marked."""
+    """Return a table of steps, room by room. Steps with numbers in `needed` are marked and never left out."""
     table = grid("right", "left")
     if not steps:
         table.add_row(Text(), Text("the robot did nothing", "dim"))

@@ -150,7 +150,7 @@ def rules(
     skills: options.SkillsOption = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """Show house rules with examples, and warn of likely mistakes.
+    """Show house rules with examples and likely mistakes.
 
     For each rule, it shows a short example that keeps the rule and one that breaks it.
     """

@@ -175,7 +175,10 @@ def _bound_in_module(source: str) -> set[str]:
 
 
 def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
-    """Return the names that a program binds in any scope (`*`: `from x import *`), except in `ignoring`."""
+    """Return the names that a program binds in any scope, with `*` for `from x import *`.
+
+    Skip the nodes in `ignoring`.
+    """
     names: set[str] = set()
     skipped = {id(node) for node in ignoring}
     for node in nodes(tree):
@@ -194,7 +197,7 @@ def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[s
 
 
 def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, int]:
-    """Return the line where each skill is first used, by its name, without skills that are redefined."""
+    """Return the line of each skill's first use, by the skill's name, without skills that are redefined."""
     rebound = all_bound_names(tree)
     lines: dict[str, int] = {}
     for node in nodes(tree):
@@ -204,7 +207,7 @@ def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, in
 
 
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
-    """Return the line and the name of each undefined name, and whether it is a local variable used early."""
+    """Return for each undefined name its line, the name, and whether it is a local variable used early."""
     from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - takes a tenth of a second
     from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - slow
 

@@ -261,7 +261,7 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
     if len(given) != len(row.parameters) or not all(
         parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)
     ):
-        raise ValueError(f"the arguments of {name} do not fit; its signature is {row.signature}")
+        raise ValueError(f"the arguments of {name} are wrong; its signature is {row.signature}")
     kinds = [kind for kind, _ in row.fails]
     if value in kinds or (row.returns.base is not None and row.returns.fits(value)):
         return

@@ -203,7 +203,7 @@ def generate(
     """
     tries = int(repair) if retries is None else retries
     if tries < 0:
-        raise UserError(f"retries must be at least 0, not {tries}")
+        raise UserError(f"the number of retries is {tries}; use a number of at least 0")
     prompt = prompt_for(instruction, rooms=rooms or (), skills=skills)
     opened = open_model(model, settings or SamplingSettings())
     return write_checked_program(opened, prompt, rooms=rooms, retries=tries, repair=repair, skills=skills)

@@ -92,7 +92,7 @@ def _templates(file: YamlFile, row: Skill, name: str, given: str | list[str]) ->
         except ValueError as error:
             raise file.wrong(str(error), *where) from None
         if found[-1].is_any and text.replace("{}", "").strip():
-            raise file.wrong("a text this long would allow any other text; shorten the text", *where)
+            raise file.wrong("the text is too long, so any text would be allowed; shorten it", *where)
     return tuple(found)
 
 

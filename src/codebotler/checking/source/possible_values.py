@@ -67,7 +67,7 @@ class PossibleValues:
         return self._own.get(name, name.id)
 
     def of(self, node: ast.expr) -> list[PossibleValue]:
-        """Return the expressions that may be a node's value, such as "hall" for `room` (None: unknown)."""
+        """Return the expressions that may be a node's value, such as "hall" for `room`; None if unknown."""
         found: list[PossibleValue] = []
         seen: set[str | ast.expr] = set()
         waiting: list[PossibleValue] = [node]

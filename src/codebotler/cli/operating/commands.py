@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class RunSettings(NamedTuple):
-    """For `run` and `continue`: how to make a request and a console, with their shared options filled in."""
+    """Functions that make the request and the console of `run` and `continue`, with shared options set."""
 
     request: Callable[..., Request]  # takes the other fields of a request
     open_console: Callable[..., Console]
@@ -35,7 +35,7 @@ def run_settings(
     recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> RunSettings:
-    """Return what `run` and `continue` need to make a request and a console with these shared options."""
+    """Return functions that make the request and the console of `run` and `continue` with these options."""
     from functools import partial
 
     from codebotler.cli.operating.run import Request

@@ -123,7 +123,7 @@ def run(console: Console, request: Request) -> int:
         print_rich(past_view(past))
         note(f"recovering: asking {order.model} for the rest of the mission")
         request = replace(request, despite_problems=False)  # accepted for the first program only
-    raise AssertionError("the last round returns a status; this is a bug")
+    raise AssertionError("the last round returned no status; this is a bug")
 
 
 def _carry_out(
