@@ -86,7 +86,7 @@ def test_there_is_no_third_round() -> None:
 
 
 def test_rejected_behaviour_is_not_taken_again() -> None:
-    with pytest.raises(UserError, match="not meant"):
+    with pytest.raises(UserError, match="rejected before"):
         Terminal([ONE, TWO], "none\n", "Only clean ones.\n").choose()
 
 
