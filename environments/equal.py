@@ -25,9 +25,11 @@ from roboeval.training.rollouts import Rollout, judge
 TASKS, EACH, MISSIONS_EACH = 100, 5, 2  # Making a task takes longer than judging five programs.
 
 Call: TypeAlias = tuple[str, dict[str, Any]]
+Example: TypeAlias = tuple[dict[str, Any], str]
+Mission: TypeAlias = tuple[dict[str, Any], list[Call]]
 
 
-def examples() -> list[tuple[dict[str, Any], str]]:
+def examples() -> list[Example]:
     """Return rows of prompts, each with EACH completions: right, wrong and invalid programs."""
     found = []
     for number, row in enumerate(load_prompts("validation", count=TASKS)):
@@ -39,7 +41,7 @@ def examples() -> list[tuple[dict[str, Any], str]]:
     return found
 
 
-def missions() -> list[tuple[dict[str, Any], list[Call]]]:
+def missions() -> list[Mission]:
     """Return missions, each with MISSIONS_EACH lists of calls: of right and wrong programs, and mistakes."""
     found = []
     for number, row in enumerate(load_missions("validation", count=TASKS)):
@@ -70,13 +72,13 @@ def calls_of(task: GeneratedTask, world: int, program: str) -> list[Call]:
     return calls
 
 
-def judge_with_core() -> list[float]:
+def judge_with_core(examples: list[Example], missions: list[Mission]) -> list[float]:
     """Compute the rewards with the library itself, first of the programs and then of the missions."""
     rollouts = [
-        Rollout(row["family"], row["seed"], row["prompt_index"], program_in(text)) for row, text in examples()
+        Rollout(row["family"], row["seed"], row["prompt_index"], program_in(text)) for row, text in examples
     ]
     rewards = [one.reward for one in judge(rollouts)]
-    for row, calls in missions():
+    for row, calls in missions:
         mission = TrainingMission.begin(row)
         for call in calls:
             mission.call(*call)
@@ -85,14 +87,14 @@ def judge_with_core() -> list[float]:
     return rewards
 
 
-def judge_with_trl() -> list[float]:
+def judge_with_trl(examples: list[Example], missions: list[Mission]) -> list[float]:
     """Compute the rewards that a trainer of TRL receives."""
     from codebotler_trl import MissionEnvironment, reward  # noqa: PLC0415 - installed in one environment only
 
-    rows, texts = zip(*examples(), strict=True)
+    rows, texts = zip(*examples, strict=True)
     columns = {name: [row[name] for row in rows] for name in ("family", "seed", "prompt_index", "opening")}
     rewards = reward([[{"role": "assistant", "content": text}] for text in texts], **columns)
-    for row, calls in missions():
+    for row, calls in missions:
         environment = MissionEnvironment()
         environment.reset(**row)
         for name, arguments in calls:
@@ -101,7 +103,7 @@ def judge_with_trl() -> list[float]:
     return rewards
 
 
-def judge_with_verifiers() -> list[float]:
+def judge_with_verifiers(examples: list[Example], missions: list[Mission]) -> list[float]:
     """Compute the rewards in traces of verifiers."""
     import codebotler_verifiers as environment  # noqa: PLC0415 - installed in one environment only
     import verifiers.v1 as vf  # noqa: PLC0415 - installed in one environment only
@@ -127,9 +129,9 @@ def judge_with_verifiers() -> list[float]:
 
     async def score_all() -> list[float]:
         prompts = [task for task in tasks("program", TASKS) for _ in range(EACH)]
-        programs = zip(prompts, examples(), strict=True)
+        programs = zip(prompts, examples, strict=True)
         begun = [task for task in tasks("agent", TASKS) for _ in range(MISSIONS_EACH)]
-        acted = zip(begun, missions(), strict=True)
+        acted = zip(begun, missions, strict=True)
         return [
             *[await score(task, text, []) for task, (_, text) in programs],
             *[await score(task, "Done.", calls) for task, (_, calls) in acted],
@@ -138,16 +140,16 @@ def judge_with_verifiers() -> list[float]:
     return asyncio.run(score_all())
 
 
-def judge_with_openenv() -> list[float]:
+def judge_with_openenv(examples: list[Example], missions: list[Mission]) -> list[float]:
     """Compute the rewards of a session of OpenEnv."""
     from codebotler_openenv import CodebotlerAction  # noqa: PLC0415 - installed in one environment only
     from codebotler_openenv.environment import CodebotlerEnvironment  # noqa: PLC0415 - installed in one environment only
 
     session, found = CodebotlerEnvironment(), []
-    for number, (_, text) in enumerate(examples()):
+    for number, (_, text) in enumerate(examples):
         session.reset(seed=number // EACH, split="validation")
         found.append(session.step(CodebotlerAction(completion=text)).reward)
-    for number, (_, calls) in enumerate(missions()):
+    for number, (_, calls) in enumerate(missions):
         session.reset(seed=number // MISSIONS_EACH, split="validation", mode="agent")
         actions = [CodebotlerAction(tool=name, arguments=arguments) for name, arguments in calls]
         for action in (*actions, CodebotlerAction(answer="Done.")):
@@ -157,7 +159,7 @@ def judge_with_openenv() -> list[float]:
     return found
 
 
-REWARDS: dict[str, Callable[[], list[float]]] = {
+REWARDS: dict[str, Callable[[list[Example], list[Mission]], list[float]]] = {
     "trl": judge_with_trl,
     "verifiers": judge_with_verifiers,
     "openenv": judge_with_openenv,
@@ -165,16 +167,18 @@ REWARDS: dict[str, Callable[[], list[float]]] = {
 
 
 def main() -> int:
-    """Compare all named environments, or print the rewards of one."""
+    """Compare all named environments, or print the rewards of one for what it is given."""
     if sys.argv[1:2] == ["--as"]:
-        print(json.dumps(REWARDS[sys.argv[2]]()))
+        print(json.dumps(REWARDS[sys.argv[2]](*json.load(sys.stdin))))
         return 0
-    expected, status = judge_with_core(), 0
+    given = examples(), missions()
+    expected, status, text = judge_with_core(*given), 0, json.dumps(given)
     right = sum(reward == 1 for reward in expected)
     print(f"core: {len(expected)} rewards, of which {right} are 1, and {expected.count(0)} are 0")
-    for given in sys.argv[1:]:
-        name, _, python = given.partition("=")
-        done = subprocess.run([python, __file__, "--as", name], check=True, capture_output=True, text=True)
+    for argument in sys.argv[1:]:
+        name, _, python = argument.partition("=")
+        command = [python, __file__, "--as", name]
+        done = subprocess.run(command, check=True, capture_output=True, text=True, input=text)
         same = sum(a == b for a, b in zip(json.loads(done.stdout.splitlines()[-1]), expected, strict=True))
         print(f"{name}: {same} of {len(expected)} equal")
         status |= same < len(expected)

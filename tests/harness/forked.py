@@ -37,8 +37,8 @@ class Forked:
     """A command in a process of its own, as `python -m NAME ARGUMENTS` would be; pipes are its streams.
 
     Args:
-        name: `codebotler` or `roboeval`.
-        arguments: those of the command.
+        name: `codebotler` or `roboeval`; or `-c`, as with `python -c`.
+        arguments: those of the command; with `-c`, the text of a script and its arguments.
         cwd: the folder in which it is called.
         environment: all its variables.
         stderr: a file for what it says beside them; a pipe by default.
@@ -220,10 +220,16 @@ def become(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
     sys.path[:0] = [folder for folder in more if folder and folder not in sys.path]
 
 
+def run_script() -> None:
+    """Run what `python -c` would."""
+    exec(sys.argv.pop(1), {"__name__": "__main__"})
+
+
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.modules.update(dict.fromkeys(sys.argv[2:]))  # type: ignore[arg-type]  # None: cannot be imported
     mains = {name: importlib.import_module(f"{name}.__main__").main for name in ("codebotler", "roboeval")}
+    mains["-c"] = run_script
     with socket.socket(fileno=int(sys.argv[1])) as door:
         words = serve(door)
     if words is not None:

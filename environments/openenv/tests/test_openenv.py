@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import re
 import socket
-import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr
+from multiprocessing import get_context
+from multiprocessing.context import ForkProcess
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import httpx
 import pytest
 from codebotler_openenv import CodebotlerAction, CodebotlerEnv, CodebotlerObservation, CodebotlerState
 from codebotler_openenv.environment import SEEDS
+from codebotler_openenv.server import main
 from openenv.cli.__main__ import app as openenv_app
 from openenv.core.client_types import StepResult
 from openenv.core.sync_client import SyncEnvClient
@@ -29,6 +32,7 @@ from openenv.validation.runtime.collector import collect_runtime_evidence
 from openenv.validation.runtime.contracts import load_runtime_plan
 from typer.testing import CliRunner
 
+from codebotler.simulator.pool import shared_pool
 from roboeval.suites.families.suite import FIRST_SEEDS
 from roboeval.suites.families.tasks import family_file, family_names, trained_task
 from roboeval.training.missions import TrainingMission, load_missions
@@ -36,50 +40,66 @@ from roboeval.training.prompts import load_prompts
 from roboeval.training.rollouts import Rollout, judge
 
 PACKAGE = Path(__file__).parents[1]
-SERVER = "from codebotler_openenv.server import main\nmain()\n"
-WITHOUT_ENGINE = (
-    "import os\n"
-    "os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"  # One processor means one worker to stop.
-    "from codebotler.simulator.pool import shared_pool\n"
-    "shared_pool().submit(lambda: shared_pool().here().stop()).result()\n"
-)
 IDLE = "def task_program():\n    pass\n"
 FOR_EVER = "def task_program():\n    while True:\n        pass\n"
 
 
+class Urls(NamedTuple):
+    usual: str
+    for_one_session: str
+    without_engine: str
+
+
+@pytest.fixture(scope="session", autouse=True)
+def urls() -> Iterator[Urls]:
+    """Start servers in processes of their own, forked while there is no thread: they import nothing anew."""
+    with (
+        start_server() as usual,
+        start_server("--sessions", "1") as for_one_session,
+        start_server(stop_engine=True) as without_engine,
+    ):
+        yield Urls(*[wait_until_healthy(*one) for one in (usual, for_one_session, without_engine)])
+
+
+@pytest.fixture
+def url(urls: Urls) -> str:
+    return urls.usual
+
+
 @contextmanager
-def start_server(before: str = "", *options: str) -> Iterator[str]:
-    """Start a server in a process of its own and yield its address."""
+def start_server(*options: str, stop_engine: bool = False) -> Iterator[tuple[str, ForkProcess]]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    server = subprocess.Popen(
-        [sys.executable, "-c", before + SERVER, "--port", str(port), *options], stderr=subprocess.DEVNULL
-    )
+    arguments = (stop_engine, "--port", str(port), *options)
+    server = get_context("fork").Process(target=be_server, args=arguments)
+    server.start()
     try:
-        wait_until_healthy(f"http://127.0.0.1:{port}", server)
-        yield f"http://127.0.0.1:{port}"
+        yield f"http://127.0.0.1:{port}", server
     finally:
         server.terminate()
-        server.wait(20)
+        server.join(20)
 
 
-def wait_until_healthy(url: str, server: subprocess.Popen[bytes]) -> None:
+def be_server(stop_engine: bool, *arguments: str) -> None:  # noqa: FBT001 - a process passes it on
+    sys.argv = ["codebotler-openenv", *arguments]
+    if stop_engine:
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})  # One processor means one worker to stop.
+        shared_pool().submit(lambda: shared_pool().here().stop()).result()
+    with Path(os.devnull).open("w") as nothing, redirect_stderr(nothing):
+        main()
+
+
+def wait_until_healthy(url: str, server: ForkProcess) -> str:
     until = time.monotonic() + 60
-    while time.monotonic() < until and server.poll() is None:
+    while time.monotonic() < until and server.is_alive():
         try:
             httpx.get(f"{url}/health", timeout=5).raise_for_status()
         except httpx.TransportError:
             time.sleep(0.1)
         else:
-            return
-    raise AssertionError(f"the server did not start: {server.poll()}")
-
-
-@pytest.fixture(scope="module")
-def url() -> Iterator[str]:
-    with start_server() as url:
-        yield url
+            return url
+    raise AssertionError(f"the server did not start: {server.exitcode}")
 
 
 Session = SyncEnvClient[CodebotlerAction, CodebotlerObservation, Any]
@@ -288,10 +308,13 @@ def test_the_server_answers_while_it_judges(session: Session, url: str) -> None:
     assert max(delays) < max(1.0, took / 2)
 
 
-def test_more_sessions_than_allowed_are_refused() -> None:
-    with start_server("", "--sessions", "1") as url, CodebotlerEnv(url).sync() as first:
+def test_more_sessions_than_allowed_are_refused(urls: Urls) -> None:
+    with CodebotlerEnv(urls.for_one_session).sync() as first:
         first.reset(seed=1)
-        with pytest.raises(RuntimeError, match="CAPACITY_REACHED"), CodebotlerEnv(url).sync() as second:
+        with (
+            pytest.raises(RuntimeError, match="CAPACITY_REACHED"),
+            CodebotlerEnv(urls.for_one_session).sync() as second,
+        ):
             second.reset(seed=1)
         assert first.step(CodebotlerAction(program=solution(first))).reward == 1
 
@@ -354,8 +377,8 @@ def test_plain_http_says_why_it_cannot_judge(url: str) -> None:
     assert "in the same session of /ws" in step.json()["detail"]
 
 
-def test_a_failure_of_the_engine_is_an_error_and_no_reward() -> None:
-    with start_server(WITHOUT_ENGINE) as url, CodebotlerEnv(url).sync() as session:
+def test_a_failure_of_the_engine_is_an_error_and_no_reward(urls: Urls) -> None:
+    with CodebotlerEnv(urls.without_engine).sync() as session:
         session.reset(seed=1)
         for _ in range(2):  # The episode continues.
             with pytest.raises(RuntimeError, match=r"EngineError: .*no reward"):

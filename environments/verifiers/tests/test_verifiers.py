@@ -6,13 +6,15 @@ import asyncio
 import json
 import os
 import re
-import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib.metadata import entry_points
 from itertools import islice
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from statistics import fmean
 from time import monotonic
@@ -20,6 +22,8 @@ from typing import Any, TypeAlias
 
 import pytest
 import verifiers.v1 as vf
+import verifiers.v1.cli.eval.main
+import verifiers.v1.cli.validate  # noqa: F401 - commands, which the tests run
 from codebotler_verifiers import (
     MissionToolset,
     TrainingConfig,
@@ -44,7 +48,9 @@ from roboeval.training.prompts import load_prompts
 NAME, FAMILY = "codebotler-verifiers", "BringThing"
 AGENT_FAMILY = "AnnounceInOrder"  # Its solutions have no branches.
 SCRIPTS = Path(sys.executable).parent
+FORK = get_context("fork")
 Call: TypeAlias = tuple[str, dict[str, Any]]
+Run: TypeAlias = Callable[..., None]
 PARTS = {"passed", "requirements", "without_errors", "parses", "rules_kept"}
 
 
@@ -66,6 +72,47 @@ def trace_of(task: TrainingTask, reply: str, calls: Sequence[Call] = ()) -> Trai
         trace.nodes.append(MessageNode(message=vf.AssistantMessage(tool_calls=[call]), sampled=True))
     trace.nodes.append(MessageNode(message=vf.AssistantMessage(content=reply), sampled=True))
     return trace
+
+
+@pytest.fixture(scope="session", autouse=True)
+def run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
+    """Run commands, each forked from a process that has imported what it needs and has no threads."""
+    line, theirs = FORK.Pipe()
+    process = FORK.Process(target=fork_commands, args=(theirs, line))
+    process.start()
+    theirs.close()
+
+    def run(name: str, *arguments: str | Path, stop_engine: bool = False) -> None:
+        said = tmp_path_factory.mktemp("command") / "said"
+        line.send((said, stop_engine, name, *map(str, arguments)))
+        assert line.recv() == 0, said.read_text()[-6_000:]
+
+    yield run
+    line.close()
+    process.join()
+
+
+def fork_commands(line: Connection, other_end: Connection) -> None:
+    other_end.close()
+    with suppress(EOFError):
+        while True:
+            command = FORK.Process(target=be_command, args=line.recv())
+            command.start()
+            command.join(240)
+            line.send(command.exitcode)
+            command.kill()
+
+
+def be_command(said: Path, stop_engine: bool, name: str, *arguments: str) -> None:  # noqa: FBT001 - from a pipe
+    with said.open("w") as file:
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+    sys.argv, sys.stdout, sys.stderr = [name, *arguments], os.fdopen(1, "w"), os.fdopen(2, "w", buffering=1)
+    os.environ["PATH"] = f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"  # The null harness needs uv.
+    if stop_engine:
+        shared_pool().submit(lambda: shared_pool().here().stop()).result()
+    (script,) = entry_points(group="console_scripts", name=name)
+    sys.exit(script.load()())
 
 
 @pytest.fixture
@@ -264,7 +311,7 @@ def test_a_mission_that_verifiers_stops_has_reached_a_limit() -> None:
     assert trace.metrics["without_errors"] == 0
 
 
-def test_the_eval_command_lets_agents_act(tmp_path: Path) -> None:
+def test_the_eval_command_lets_agents_act(tmp_path: Path, run: Run) -> None:
     tasks = agent_tasks(2)
     replies: dict[str, list[dict[str, Any]]] = {}
     for number, task in enumerate(tasks):
@@ -272,7 +319,7 @@ def test_the_eval_command_lets_agents_act(tmp_path: Path) -> None:
         replies[instruction_of(task)] = [*({"tool": call} for call in calls), {"content": "Done."}]
     with serve_replies(replies) as url:
         options = eval_options(url, tmp_path, 2, AGENT_FAMILY)
-        run(SCRIPTS / "vf-eval", *options, "--env.taskset.mode", "agent")
+        run("vf-eval", *options, "--env.taskset.mode", "agent")
     traces = [trace for one in read_lines(tmp_path / "run" / "traces.jsonl") for trace in one["traces"]]
     assert all(trace["ok"] for trace in traces)
     scores = {trace["task"]["key"]: trace["rewards"]["reward"]["score"] for trace in traces}
@@ -287,14 +334,14 @@ def test_the_eval_command_lets_agents_act(tmp_path: Path) -> None:
 # --- the commands of verifiers
 
 
-def test_the_eval_command_judges_programs(tmp_path: Path) -> None:
-    tasks = list(taskset(count=4, families=[FAMILY]))
+def test_the_eval_command_judges_programs(tmp_path: Path, run: Run) -> None:
+    tasks = list(taskset(count=2, families=[FAMILY]))
     replies = {
         instruction_of(task): [{"content": solution(task) if number % 2 else ""}]
         for number, task in enumerate(tasks)
     }
     with serve_replies(replies) as url:
-        run(SCRIPTS / "vf-eval", *eval_options(url, tmp_path, 4))
+        run("vf-eval", *eval_options(url, tmp_path, 2))
     episodes = read_lines(tmp_path / "run" / "traces.jsonl")
     traces = [trace for episode in episodes for trace in episode["traces"]]
     assert all(trace["ok"] for trace in traces)
@@ -304,16 +351,10 @@ def test_the_eval_command_judges_programs(tmp_path: Path) -> None:
     assert all(set(trace["metrics"]) >= PARTS for trace in traces)
 
 
-def test_the_eval_command_records_a_failure_of_the_engine(tmp_path: Path) -> None:
+def test_the_eval_command_records_a_failure_of_the_engine(tmp_path: Path, run: Run) -> None:
     (task,) = taskset(count=1, families=[FAMILY])
-    program = (
-        "from codebotler.simulator.pool import shared_pool\n"
-        "from verifiers.v1.cli.eval.main import main\n"
-        "shared_pool().submit(lambda: shared_pool().here().stop()).result()\n"
-        "main()\n"
-    )
     with serve_replies({instruction_of(task): [{"content": solution(task)}]}) as url:
-        run(sys.executable, "-c", program, *eval_options(url, tmp_path, 1))
+        run("vf-eval", *eval_options(url, tmp_path, 1), stop_engine=True)
     (episode,) = read_lines(tmp_path / "run" / "traces.jsonl")
     (trace,) = episode["traces"]
     assert not episode["ok"]
@@ -323,9 +364,9 @@ def test_the_eval_command_records_a_failure_of_the_engine(tmp_path: Path) -> Non
     assert not any(trace["rewards"].values())
 
 
-def test_the_validate_command_accepts_all_tasks(tmp_path: Path) -> None:
+def test_the_validate_command_accepts_all_tasks(tmp_path: Path, run: Run) -> None:
     options = ("-n", "3", "-c", "2", "--runtime.type", "subprocess", "-o", tmp_path, "--run.name", "run")
-    run(SCRIPTS / "vf-validate", NAME, "--no-rich", *options)
+    run("vf-validate", NAME, "--no-rich", *options)
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["outcomes"]["valid"] == summary["total"] == 3
 
@@ -339,14 +380,6 @@ def eval_options(url: str, folder: Path, count: int, family: str = FAMILY) -> li
     model = ["-m", "scripted", "--client.base-url", url, "--client.api-key-var", "NO_SUCH_KEY"]
     place = ["-o", str(folder), "--run.name", "run", "--no-push", "--no-rich"]
     return [NAME, "-n", str(count), "-c", "2", *model, *place, "--env.taskset.families", f'["{family}"]']
-
-
-def run(*command: str | Path) -> None:
-    path = f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"  # The null harness needs uv, which may be there.
-    done = subprocess.run(
-        command, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=240, check=False
-    )
-    assert done.returncode == 0, done.stdout[-3_000:] + done.stderr[-3_000:]
 
 
 def read_lines(path: Path) -> list[dict[str, Any]]:

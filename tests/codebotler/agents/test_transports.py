@@ -34,6 +34,7 @@ from pageserver import WORLD, PageServer
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
 FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('hall')\n"
 SERVE = ("codebotler", "mcp", "--http", "--world", "world.yaml")
+SERVER = (*PAGE, *PROGRAMS, "codebotler.agents.server")
 SOON = 60.0
 DRIVES = {"go_to": {"location": "any"}, "get_all_rooms": {}, "get_current_location": {}}
 
@@ -355,25 +356,21 @@ for number in numbers:
 @pytest.mark.slow
 def test_only_the_event_loop_closes_the_descriptors_of_the_streams() -> None:
     # A descriptor that is closed twice may by then be a file of a mission, which another thread has opened.
-    subprocess.run([sys.executable, "-c", CLOSING], input=b"", stdout=subprocess.PIPE, check=True)
+    with Forked("-c", CLOSING, cwd=Path.cwd(), environment=os.environ, preload=SERVER) as running:
+        running.communicate()
+        assert running.returncode == 0
 
 
 @pytest.mark.slow
 def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path) -> None:
     (folder / "skills.py").write_text(NOISY_SKILLS)
-    with subprocess.Popen(
-        command("--skills", "skills.py", "--speed", "0"),
-        cwd=folder,
-        env=environment(folder),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    ) as running:
-        assert running.stdin is not None
+    _, _, *words = command("--skills", "skills.py", "--speed", "0")
+    with Forked(*words, cwd=folder, environment=environment(folder), preload=SERVER) as running:
         assert running.stdout is not None
         program = "def task_program():\n    print('noise')\n    wave()\n"
-        running.stdin.write(HANDSHAKE + b"not json\n" + pack(request(2, "check_program", program=program)))
-        running.stdin.write(pack(request(3, "propose_mission", program=program), request(4, "no_such_tool")))
+        to = running.stdin.buffer
+        to.write(HANDSHAKE + b"not json\n" + pack(request(2, "check_program", program=program)))
+        to.write(pack(request(3, "propose_mission", program=program), request(4, "no_such_tool")))
         running.stdin.flush()
         answers: dict[object, Any] = {}
         while {1, 2, 3, 4} - {*answers}:
@@ -382,8 +379,8 @@ def test_nothing_but_the_protocol_goes_to_standard_output(folder: Path) -> None:
             answers[message.get("id")] = message
         assert answers[3]["result"]["structuredContent"]["state"] == "checked"
         rest, said = running.communicate(timeout=SOON)
-        assert (rest, running.returncode) == (b"", 0)
-        assert b"?token=" in said
+        assert (rest, running.returncode) == ("", 0)
+        assert "?token=" in said
     (summary,) = read_missions(folder / "home")
     assert summary.state == "stopped"
 
@@ -401,7 +398,7 @@ def test_a_running_robot_stops_with_the_server(folder: Path, ending: str) -> Non
             cwd=folder,
             environment=environment(folder),
             stderr=nowhere,
-            preload=(*PAGE, *PROGRAMS, "codebotler.agents.server"),
+            preload=SERVER,
         ) as running,
     ):
         assert running.stdout is not None

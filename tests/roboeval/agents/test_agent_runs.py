@@ -3,8 +3,6 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -25,6 +23,7 @@ from agent_server import (
 from codebotler.core.errors import UserError
 from codebotler.models.open import open_model
 from codebotler.models.sampling import SamplingSettings
+from forked import PROGRAMS, Forked
 from roboeval.evaluation.agents.conversation import TurnLimits
 from roboeval.evaluation.agents.plan import AgentMode, AgentPlan
 from roboeval.evaluation.evaluate import evaluate_run
@@ -347,6 +346,7 @@ def test_a_run_keeps_its_limits(tmp_path: Path, suite: Suite) -> None:
             act(run, suite, server, count=2)
 
 
+PRELOAD = (*PROGRAMS, "codebotler.models.servers.chat", "openai.resources.chat")
 SCRIPT = """
 import pathlib, sys
 from codebotler.models.open import open_model
@@ -381,12 +381,7 @@ def test_an_interrupted_run_continues_after_its_last_turn(
     with server:
         for asked in (20, 90):
             script = SCRIPT.format(url=server.url, suite=str(suite.folder), run=str(run.path))
-            process = subprocess.Popen(
-                [sys.executable, "-c", script],
-                env=environment,
-                stderr=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-            )
+            process = Forked("-c", script, cwd=tmp_path, environment=environment, preload=PRELOAD)
             deadline = time.monotonic() + 60
             while len(server.requests) < asked and process.poll() is None:
                 assert time.monotonic() < deadline

@@ -4,7 +4,6 @@ import asyncio
 import json
 import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -13,12 +12,14 @@ import pytest
 from mcp import Client, StdioServerParameters
 from mcp_types import TextContent
 
+from forked import PROGRAMS, Forked
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.suites.load import Suite, load_suite
 from small_suite import write_suite
 
 TIMEOUT_S = 60
+PRELOAD = (*PROGRAMS, "roboeval.evaluation.agents.mcp_server")
 WORLDS = """\
 name: T
 summary: s
@@ -101,14 +102,12 @@ def test_a_signal_ends_the_mission_like_the_end_of_input(
         ("initialize", about),
         ("tools/call", {"name": "next_mission", "arguments": {}}),
     ]
-    with subprocess.Popen(
-        [sys.executable, *command(tmp_path / "run", suite)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as process:
-        assert process.stdin is not None
+    _, *words = command(tmp_path / "run", suite)
+    with Forked(*words, cwd=tmp_path, environment=os.environ, preload=PRELOAD) as process:
         assert process.stdout is not None
         for one, (method, parameters) in enumerate(asked):
             request = {"jsonrpc": "2.0", "id": one, "method": method, "params": parameters}
-            process.stdin.write(json.dumps(request).encode() + b"\n")
+            process.stdin.write(json.dumps(request) + "\n")
             process.stdin.flush()
             process.stdout.readline()
         process.send_signal(number)

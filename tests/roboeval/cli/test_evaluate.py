@@ -239,9 +239,7 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path) -> None:
         f"with RunFolder(pathlib.Path({str(tmp_path / 'run')!r})).writing():\n"
         "    print('on', flush=True)\n    sys.stdin.read()\n"
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as process:
+    with Forked("-c", script, cwd=tmp_path, environment=ENVIRONMENT) as process:
         assert process.stdout is not None
         process.stdout.readline()
         refusal = refused("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path)

@@ -5,8 +5,6 @@ import os
 import random
 import re
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections import Counter
@@ -21,6 +19,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line
 from codebotler.models.base import ModelError
 from codebotler.models.sampling import SamplingSettings
+from forked import Forked
 from roboeval.evaluation.generating.generate import GenerationProgress, Pace, generate_run
 from roboeval.evaluation.generating.requests import GenerationPlan, RequestLog
 from roboeval.evaluation.runs.completions import read_completions
@@ -398,7 +397,7 @@ generate_run(
 
 def start_process(
     run: RunFolder, log: Path, *, count: int, seconds: float = 0.01, before: str = ""
-) -> subprocess.Popen[bytes]:
+) -> Forked:
     script = SCRIPT.format(
         tests=str(Path(__file__).parents[1]),
         run=str(run.path),
@@ -408,7 +407,7 @@ def start_process(
         seconds=seconds,
         before=before,
     )
-    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = Forked("-c", script, cwd=run.path.parent, environment=os.environ)
     assert process.stdout is not None
     process.stdout.readline()
     return process
@@ -472,7 +471,7 @@ def test_ctrl_c_keeps_completions_and_counts_pending_requests(tmp_path: Path, pa
     wait_for_notes(log, 50)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
-    assert b"KeyboardInterrupt" in err
+    assert "KeyboardInterrupt" in err
     done = set(keys(run))
     under_way = asked_of(log, process.pid, paper) - done
     assert 0 < len(under_way) <= 5
@@ -515,7 +514,7 @@ def test_a_full_disk_leaves_whole_rows_and_stops_requests(tmp_path: Path, paper:
     process = start_process(run, log, count=20, seconds=0.0, before=limit)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 1
-    assert b"OSError: [Errno 27] File too large" in err
+    assert "OSError: [Errno 27] File too large" in err
     assert run.completions.read_bytes().endswith(b"}\n")
     done = set(keys(run))
     under_way = asked_of(log, process.pid, paper) - done

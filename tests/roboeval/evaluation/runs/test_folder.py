@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import random
 import re
 import signal
@@ -17,6 +18,7 @@ from typer.testing import CliRunner
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import read_rows, to_line
+from forked import Forked
 from roboeval.cli.app import app
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.judging.time_limit import TimeLimitExceeded, time_limit
@@ -136,13 +138,13 @@ def test_kill_minus_nine_neither_loses_nor_repeats_rows(tmp_path: Path, paper: S
     chance = random.Random(7)
     kills = 0
     for _ in range(6):
-        process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE)
+        process = Forked("-c", script, cwd=tmp_path, environment=os.environ)
         assert process.stdout is not None
         process.stdout.readline()
         time.sleep(chance.uniform(0.1, 1.2))
-        process.send_signal(signal.SIGKILL)
+        process.kill()
         kills += process.wait() == -signal.SIGKILL
-        process.stdout.close()
+        process.communicate()
     assert kills >= 3
     rows = judge_run(run, paper)
     assert run.rows("paper").read_bytes() == whole.rows("paper").read_bytes()
@@ -217,9 +219,7 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
         "    print('on', flush=True)\n"
         "    sys.stdin.read()\n"
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as process:
+    with Forked("-c", script, cwd=tmp_path, environment=os.environ) as process:
         assert process.stdout is not None
         process.stdout.readline()
         with pytest.raises(UserError, match="another process"):
@@ -376,8 +376,10 @@ def test_a_full_disk_leaves_only_whole_rows(tmp_path: Path, paper: Suite) -> Non
         "resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500))\n"
         "list(rows)\n"
     )
-    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
-    assert ended.returncode != 0
+    with Forked("-c", script, cwd=tmp_path, environment=os.environ) as ended:
+        _, err = ended.communicate()
+    assert ended.returncode == 1
+    assert "File too large" in err
     assert run.rows("paper").read_bytes().endswith(b"\n")
     assert len(judge_run(run, paper)) == 2
 
