@@ -1,7 +1,7 @@
 # Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
 # installed (this folder, or a wheel), VENV where, EXTRAS with which extras.
 #
-#   make test       what to run before each commit, with the tutorial of own skills; TESTS names what to run instead. At
+#   make test       what to run before each commit, with the tutorial of custom skills; TESTS names what to run instead. At
 #                   its end it lists the ten tests that took the most processor time; one above 0.1 s is marked slow
 #   make test-all   that, and everything below
 #     test-slow            tests that are marked slow, since they take more than 0.1 s of a processor

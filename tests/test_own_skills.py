@@ -1,4 +1,4 @@
-"""Six sets of own skills, from the model's prompt to the robot, the benchmark and the page."""
+"""Six sets of custom skills, from the model's prompt to the robot, the benchmark and the page."""
 
 import inspect
 import json
@@ -67,7 +67,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @dataclass(frozen=True)
 class Own:
-    """A set of own skills."""
+    """A set of custom skills."""
 
     folder: Path
 

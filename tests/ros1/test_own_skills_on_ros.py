@@ -1,4 +1,4 @@
-"""Own skills over a real ROS graph: values of every type, and errors, go there and back."""
+"""Custom skills over a real ROS graph: values of every type, and errors, go there and back."""
 
 from __future__ import annotations
 

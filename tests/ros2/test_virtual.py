@@ -1,4 +1,4 @@
-"""The virtual robot on a real ROS 2 graph, also with own skills and as a command."""
+"""The virtual robot on a real ROS 2 graph, also with custom skills and as a command."""
 
 from __future__ import annotations
 

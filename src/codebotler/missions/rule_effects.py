@@ -121,7 +121,7 @@ def find_log_effect(path: Path, rules: Sequence[Rule], world: World | None, skil
         world = world or next((map_from(line) for line in events if line["event"] == "map"), None)
         return _log_effect(events, NotingGuard(rules, world), LoggedRobot(world, skills))
     except (AttributeError, LookupError, TypeError, ValueError, re.error):
-        sentence = "the log does not match the known skills; name the files of own skills with --skills"
+        sentence = "the log does not match the known skills; name the files of custom skills with --skills"
         raise UserError(sentence, file=path) from None
 
 

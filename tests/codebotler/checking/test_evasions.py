@@ -1,4 +1,4 @@
-"""Rules that programs could evade: by other names of a room, or inside the user's own skills."""
+"""Rules that programs could evade: by other names of a room, or inside custom skills."""
 
 from __future__ import annotations
 

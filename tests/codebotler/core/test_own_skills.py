@@ -1,4 +1,4 @@
-"""Files of own skills: the declarations that they may hold, and the error for each mistake."""
+"""Files of custom skills: the declarations that they may hold, and the error for each mistake."""
 
 import pickle
 import subprocess

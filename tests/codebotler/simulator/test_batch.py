@@ -336,7 +336,7 @@ def test_next_program_finds_no_trace_of_the_one_before(worker: Worker) -> None:
     assert texts == ["0.0", "name 'left' is not defined", "name 'other' is not defined"]
 
 
-# --- own skills
+# --- custom skills
 
 
 class Waves:

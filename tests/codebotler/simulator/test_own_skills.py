@@ -1,4 +1,4 @@
-"""Own skills in simulation: their random results, and failed attempts that count for house rules."""
+"""Custom skills in simulation: their random results, and failed attempts that count for house rules."""
 
 from collections.abc import Sequence
 

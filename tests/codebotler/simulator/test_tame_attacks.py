@@ -401,7 +401,7 @@ def test_tame_program_does_not_affect_other_runs(
     assert together == [honest.get(each, wanted) for each in order]
 
 
-# --- own skills
+# --- custom skills
 
 
 def wave(robot: SimulatedRobot, person: str) -> None:

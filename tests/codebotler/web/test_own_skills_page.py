@@ -1,4 +1,4 @@
-"""The page of a robot with own skills lists, checks and runs them."""
+"""The page of a robot with custom skills lists, checks and runs them."""
 
 from __future__ import annotations
 

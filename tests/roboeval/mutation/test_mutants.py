@@ -88,4 +88,4 @@ def test_every_operator_applies_to_some_right_program(paper: Suite) -> None:
         context = Context.of([scenario.world for scenario in task.scenarios])
         for made in mutants(originals(task), context, idle.copy().values()):
             idle.pop(made.operator, None)
-    assert set(idle) == {operator.name for operator in operators_in(misuse)}  # The suite lacks own skills.
+    assert set(idle) == {operator.name for operator in operators_in(misuse)}  # The suite lacks custom skills.

@@ -201,7 +201,7 @@ def read_past(
     except UserError:
         raise
     except (AttributeError, LookupError, TypeError, ValueError, re.error):
-        sentence = "the log does not match the known skills; name the files of own skills with --skills"
+        sentence = "the log does not match the known skills; name the files of custom skills with --skills"
         raise UserError(sentence, file=folder) from None
     return MissionPast(
         summary.id,

@@ -50,7 +50,7 @@ TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 def message(
     programs: Programs,
 ) -> tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
-    """Return a batch for a child: skills, names of own skills, pickled robots, code with robot numbers."""
+    """Return a batch for a child: skills, names of custom skills, pickled robots, code with robot numbers."""
     robot = programs[0][1][0]
     setups: dict[tuple[int, ...], Setup] = {}
     keyed = []

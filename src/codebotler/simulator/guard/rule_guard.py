@@ -85,7 +85,7 @@ class RuleGuard:
         self._history = _History([(rule, Monitor(rule.formula)) for rule in rules])
 
         # The current skill call.
-        self._is_own = False  # whether it is the user's own skill, whose events are provisional until it ends
+        self._is_own = False  # whether it is a custom skill, whose events are provisional until it ends
         self._start = self._seen = 0  # number of events before the call, and of events judged so far
         self._held: Thing | None = None  # what the robot held before the call
         self._prevented: RuleViolationError | None = None  # the skill may have caught it
@@ -145,7 +145,7 @@ class RuleGuard:
             self._history = history
 
     def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
-        """Raise RuleViolationError if the next event inside a user's own skill would break a rule."""
+        """Raise RuleViolationError if the next event inside a custom skill would break a rule."""
         # Events inside a skill are provisional: the skill's own event may come before them, but its result is
         # not known until the call ends.
         if not self._is_own:

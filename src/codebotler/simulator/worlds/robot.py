@@ -62,7 +62,7 @@ class SimulatedRobot(SimulatedWorld):
         self.taken: Thing | None = None
         self.now, self.is_live = 0.0, False
         self.line: int | None = None
-        self._own_skill: Skill | None = None  # the user's own skill that is being executed
+        self._own_skill: Skill | None = None  # a custom skill that is being executed
         self.events: list[Event] = []
 
     @property
@@ -177,11 +177,11 @@ class SimulatedRobot(SimulatedWorld):
         self.contents[self.room].append(same or Thing(obj, is_pattern=False))
         self.held = self.taken = None
 
-    # --- the user's own skills
+    # --- custom skills
 
     @cached_property
     def state(self) -> dict[str, Any]:
-        """The values that the user's own skills store between calls."""
+        """The values that custom skills store between calls."""
         return {}
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
@@ -217,7 +217,7 @@ class SimulatedRobot(SimulatedWorld):
         raise RobotError(kind, f"{row.name}: {declared[kind]}")
 
     def _own(self, row: Skill, arguments: Sequence[Argument]) -> Result:
-        """Execute one of the user's own skills, and record its event."""
+        """Execute a custom skill, and record its event."""
         event, at = None, len(self.events)
         if row.adds_event:
             event = attempted_event(row, arguments, place=self.place, time=self.now, holding=self.held or "")

@@ -17,14 +17,14 @@ NO_CHOICE: dict[str, Any] = {"str": "anything", "int": 1_000, "float": 1_000.5}
 
 
 def pass_another_type(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that replaces an argument of an own skill with a value of the wrong type."""
+    """Yield each edit that replaces an argument of a custom skill with a value of the wrong type."""
     for node, skill in _own_calls(program):
         for argument, parameter in zip(node.args, skill.parameters, strict=False):
             yield {argument: ast.Constant(OTHER_TYPE[parameter.type.base or "str"])}
 
 
 def pass_no_choice(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that replaces an argument of an own skill with a value that is not allowed."""
+    """Yield each edit that replaces an argument of a custom skill with a value that is not allowed."""
     for node, skill in _own_calls(program):
         for argument, parameter in zip(node.args, skill.parameters, strict=False):
             if parameter.type.choices:
@@ -32,14 +32,14 @@ def pass_no_choice(program: ProgramTree, _: Context) -> Edits:
 
 
 def forget_an_argument(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that removes the last argument from a call of an own skill."""
+    """Yield each edit that removes the last argument from a call of a custom skill."""
     for node, _skill in _own_calls(program):
         if node.args:
             yield {node: ast.Call(node.func, node.args[:-1], node.keywords)}
 
 
 def handle_no_error(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that removes the error handling (`try`) around an own skill."""
+    """Yield each edit that removes the error handling (`try`) around a custom skill."""
     for node in program.nodes:
         if isinstance(node, ast.Try) and any(
             _is_own(inner) for part in node.body for inner in ast.walk(part)
@@ -48,19 +48,19 @@ def handle_no_error(program: ProgramTree, _: Context) -> Edits:
 
 
 def skip_a_step(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that removes a call of an own skill, on which later steps may depend."""
+    """Yield each edit that removes a call of a custom skill, on which later steps may depend."""
     return ({node: []} for node in program.nodes if isinstance(node, ast.Expr) and _is_own(node.value))
 
 
 def take_a_step_again(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that calls an own skill twice instead of once."""
+    """Yield each edit that calls a custom skill twice instead of once."""
     for node in program.nodes:
         if isinstance(node, ast.Expr) and _is_own(node.value):
             yield {node: [node, node]}
 
 
 def ask_for_success_in_vain(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that makes the program ignore whether an own skill succeeded."""
+    """Yield each edit that makes the program ignore whether a custom skill succeeded."""
     for node in program.nodes:
         match node:
             case ast.If(test, body) if _is_own(test):
