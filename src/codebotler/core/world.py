@@ -75,7 +75,7 @@ class World:
         robot: the room where the robot starts.
         about: a short description.
         may_wait_forever: whether a program may wait in this world for something that never happens.
-        truths: statements and calls of custom skills with their values, such as `('read_gauge("boiler")', 3)`.
+        truths: statements and calls of custom skills with their values: `('read_gauge("boiler")', 3)`.
         traits: the properties of things and people, such as `("apple", (("kind", "fruit"),))`.
     """
 
