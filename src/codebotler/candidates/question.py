@@ -43,7 +43,7 @@ ClarifyingAnswer: TypeAlias = int | Literal["none", "decide"]
 """The position of an option from 0, `none` to reject them all, or `decide` to leave it to the tool."""
 
 
-BRIEF, WHOLE = (4, 70), (1_000, 4_000)
+BRIEF, COURSE, WHOLE = (4, 70), (20, 200), (1_000, 4_000)
 """Limits for actions, rooms of an action, and characters; `WHOLE` if brief descriptions are equal."""
 
 
@@ -56,6 +56,7 @@ class CandidateOption:
         size: the number of candidates that behave like it, in this world at least.
         steps: its steps in the world of the question, from `steps_of`.
         difference: how it differs from the other options, such as "ends in kitchen".
+        course: all that it says, asks and moves, and where it ends.
         own: the numbers, from 1, of the steps that not all options share.
         share: how many candidates behave like it, and in how many worlds it waits without success, in words.
     """
@@ -64,6 +65,7 @@ class CandidateOption:
     size: int
     steps: tuple[Mapping[str, Any], ...] = field(repr=False)
     difference: str
+    course: str
     own: frozenset[int] = frozenset()
     share: str = ""
 
@@ -122,7 +124,7 @@ class ClarifyingQuestion:
     def rejections(self) -> list[str]:
         """Hints for a model, one per option: "the person did not mean a robot that ends in kitchen"."""
         meant = f"the person did not mean{self.supposition}{',' * bool(self.facts)} a robot that"
-        return [f"{meant} {one.difference}" for one in self.options]
+        return [f"{meant} {one.course}" for one in self.options]
 
     def chosen(self, answer: ClarifyingAnswer) -> CandidateOption | None:
         """Return the option that an answer selects: the first one for `decide`, and None for `none`."""
@@ -136,8 +138,8 @@ class ClarifyingQuestion:
             return self.rejections
         who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
         others = (one for one in self.options if one is not option)
-        rest = [f"another option was a robot that {one.difference}" for one in others]
-        return [f"{who}{self.supposition}: a robot that {option.difference}", *rest]
+        rest = [f"another option was a robot that {one.course}" for one in others]
+        return [f"{who}{self.supposition}: a robot that {option.course}", *rest]
 
     def parse(self, line: str) -> ClarifyingAnswer:
         """Read an answer: an option's number from 1, `none` or `you decide`. Raise UserError for others."""
@@ -182,7 +184,9 @@ def question_about(
     for one, sample, (words, own) in zip(shown, samples, differences, strict=True):
         behaviour, steps = one.behaviours[number], tuple(steps_of(sample.outcome.trace, has_places=True))
         size = sum(other.size for other in groups.clusters if other.behaviours[number] == behaviour)
-        options.append(CandidateOption(one.program, size, steps, words, own, _share(one, size, groups.total)))
+        course = _words(sample, range(1, len(steps) + 1), {"ending", "room"}, COURSE)
+        share = _share(one, size, groups.total)
+        options.append(CandidateOption(one.program, size, steps, words, course, own, share))
     why_last = "this is the second question" if is_second else ""
     why_last = "a recorded model writes no new programs" if is_recorded(model) else why_last
     facts = _facts_that_matter(shown, number)
@@ -231,7 +235,8 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
         # The steps of each option show its answer, if options get different answers to the same words.
         kept = [one for one in drawn if one.form != ANSWER_FORM or asked[one.names[:-1]] == 1]
         # What only some options find out explains best why they differ.
-        return sorted(kept, key=lambda one: (drawn[one] == len(shown), bool(ABSENCE.search(one.sentence))))
+        kept.sort(key=lambda one: (one.form == ANSWER_FORM, bool(ABSENCE.search(one.sentence))))
+        return sorted(kept, key=lambda one: drawn[one] == len(shown))
 
     same = [world for world in range(len(shown[0].samples)) if len({o.behaviours[world] for o in shown}) == 1]
     alike = [set(facts(world)) for world in same]
@@ -241,7 +246,7 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
         is_in = one.form.endswith(' in "{}"')
         what, _, room = one.sentence.rpartition(' "') if is_in else (one.sentence, "", "")
         rooms.setdefault(what, []).append(f'"{room}' * is_in)
-    sentences = [f"{what} {listed(some)}".rstrip() for what, some in rooms.items()]
+    sentences = [f"{what} {listed(sorted(some))}".rstrip() for what, some in rooms.items()]
     return tuple(elide_list(sentences, MAX_QUESTION_FACTS))
 
 
@@ -297,7 +302,8 @@ def _words(sample: Sample, own: Container[int], differ: Container[str], limits: 
     if parts:
         return listed(parts)
     acts = [one for one in outcome.trace if one.kind not in {GOTO, CHECK}]
-    return f"only {listed(_acts(acts, limits))}" if acts else "does nothing"
+    idle = "only drives and looks" if outcome.trace else "does nothing"
+    return f"only {listed(_acts(acts, limits))}" if acts else idle
 
 
 def _acts(events: Iterable[Event], limits: tuple[int, int], others: Container[str] = ()) -> list[str]:

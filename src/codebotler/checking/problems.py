@@ -159,6 +159,12 @@ class CheckResult:
         return f"The program takes for granted that {found}." if found else ""
 
     @property
+    def vain_runs(self) -> str:
+        """In how many worlds the robot waits or ends without success; empty if in none, or in all of them."""
+        count, total = sum(sample.in_vain for sample in self.samples), len(self.samples)
+        return f"in {count} of {total} worlds, the robot waits or ends without success" * (0 < count < total)
+
+    @property
     def evidence(self) -> frozenset[int]:
         """The numbers of the samples that show the problems: for each problem, the first sample with it."""
         ends = {

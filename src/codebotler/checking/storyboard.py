@@ -70,14 +70,16 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 def select_steps(
     steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 ) -> Iterator[tuple[bool, Sequence[Mapping[str, Any]]]]:
-    """Yield groups of steps, and whether to show each: of a long trace, both ends and those in `needed`."""
+    """Yield groups of steps, and whether to show each: of a long trace, both ends and the first `needed`."""
+    marked = [step["step"] for step in steps if step["step"] in needed][:MAX_SHOWN_STEPS]
 
     def is_shown(step: Mapping[str, Any]) -> bool:
         number = step["step"]
         is_end = number <= FIRST_STEPS or number > len(steps) - LAST_STEPS
-        return len(steps) <= MAX_SHOWN_STEPS or is_end or number in needed
+        return len(steps) <= MAX_SHOWN_STEPS or is_end or number in marked
 
-    return ((shown, list(some)) for shown, some in groupby(steps, key=is_shown))
+    groups = ((shown, list(some)) for shown, some in groupby(steps, key=is_shown))
+    return ((shown or len(some) == 1, some) for shown, some in groups)
 
 
 def step_text(step: Mapping[str, Any]) -> Text:

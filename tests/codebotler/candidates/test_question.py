@@ -125,7 +125,7 @@ def test_rooms_of_the_same_thing_are_one_fact_and_what_only_some_options_learn_c
     one, other = cluster(1, "a", ONE), cluster(1, "b", TWO)
     one = replace(one, samples=(replace(one.samples[0], facts=(mug, pen, too)),))
     other = replace(other, samples=(replace(other.samples[0], facts=(mug, pen, too, no_cup)),))
-    assert ask_about(one, other).facts == (no_cup.sentence, '"mug" is in "lab" and "den"', pen.sentence)
+    assert ask_about(one, other).facts == (no_cup.sentence, '"mug" is in "den" and "lab"', pen.sentence)
 
 
 def test_facts_that_hold_come_first() -> None:
@@ -196,6 +196,8 @@ def test_sentences_describe_only_differences() -> None:
     assert describe((drive("hall", "lab"), *ONE), ()) == both
     assert [own for _, own in differences_of((drive("hall", "lab"), *ONE), ())] == [{1, 2}, set()]
     assert describe(ONE, ()) == ['says "1 mugs" in hall', "does nothing"]
+    look = Event("check", "mug", found=False, place="hall")
+    assert describe(ONE, (look,)) == ['says "1 mugs" in hall', "only drives and looks"]
 
 
 def test_steps_that_all_options_share_are_not_their_own() -> None:
@@ -237,6 +239,15 @@ def test_texts_that_differ_late_are_shown_whole() -> None:
     assert describe((say(one),), (say(other),)) == [f'says "{text}" in hall' for text in (one, other)]
 
 
+def test_a_rejection_names_all_that_an_option_does() -> None:
+    shared = (drive("hall", "lab"), say("Hi", "lab"), drive("lab", "hall"))
+    question = ask_about(cluster(1, "a", (*shared, *ONE)), cluster(1, "b", shared))
+    assert [one.difference for one in question.options] == ['says "1 mugs" in hall', 'only says "Hi" in lab']
+    first, second = question.rejections
+    assert first.endswith('a robot that says "Hi" in lab, says "1 mugs" in hall and ends in hall')
+    assert second.endswith('a robot that says "Hi" in lab and ends in hall')
+
+
 def test_rejections_name_the_world_that_they_are_about() -> None:
     question = ask_about(cluster(1, "a", ONE, ONE), cluster(1, "b", TWO, ONE))
     assert all(MUG.sentence in one for one in question.rejections)
@@ -251,7 +262,7 @@ def test_different_answers_to_the_same_words_are_no_facts() -> None:
     ]
     assert ask_about(*clusters).facts == (CUP.sentence,)
     same = [replace(each, samples=clusters[0].samples) for each in clusters]
-    assert ask_about(*same).facts == (facts[0].sentence, CUP.sentence)
+    assert ask_about(*same).facts == (CUP.sentence, facts[0].sentence)
 
 
 def test_sentence_names_what_is_said_and_where() -> None:

@@ -67,16 +67,16 @@ def test_a_person_chooses_and_the_mission_keeps_the_answer(
         assert view.phase == "question"
         assert view.question is not None
         assert [option.size for option in view.question.options] == [2, 1]
-        difference, options = view.question.chosen(answer), view.question.options
+        chosen, options = view.question.chosen(answer), view.question.options
         session.answer(session.view.question, answer)
         view = wait_for_person(session)
         assert (view.program, view.question, view.author) == (program, None, "several")
         assert view.may_be_approved
-        assert difference is not None
+        assert chosen is not None
         kept = notes(tmp_path, view)
-        (note,) = [note for note in kept if difference.difference in note]
+        (note,) = [note for note in kept if chosen.course in note and "another" not in note]
         assert ("left the choice" in note) == (answer == "decide")
-        assert all(any(option.difference in note for note in kept) for option in options)
+        assert all(any(option.course in note for note in kept) for option in options)
 
 
 def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_path: Path) -> None:
@@ -93,7 +93,7 @@ def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_pa
         assert session.is_changed_by_person
         assert model.prompts[-1].instruction == "Do it. But quietly."
         kept = notes(tmp_path, view)
-        assert all(any(one.difference in note for note in kept) for one in question.options)
+        assert all(any(one.course in note for note in kept) for one in question.options)
         session.answer(session.view.question, "none", "And fast.")
         view = session.wait_until(lambda now: now.is_over or now.state is MissionState.FAILED)
         assert view.state is MissionState.FAILED

@@ -11,6 +11,7 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.checking.problems import Problem
+from codebotler.checking.storyboard import MAX_SHOWN_STEPS, select_steps, steps_of
 from codebotler.core.trace import Event
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
@@ -249,6 +250,15 @@ def test_strips_show_each_kind_of_world_once() -> None:
     assert all(strip.ends_well for strip in shown)
 
 
+def test_a_long_run_is_shortened_once_even_if_many_steps_are_needed() -> None:
+    trace = tuple(Event(kind, "mug", place="hall") for _ in range(250) for kind in ("check", "pick", "place"))
+    steps = steps_of(trace)
+    needed = {step["step"] for step in steps if step["kind"] != "check"}
+    groups = [(is_shown, len(some)) for is_shown, some in select_steps(steps, needed)]
+    assert [is_shown for is_shown, _ in groups if not is_shown] == [False]
+    assert sum(size for is_shown, size in groups if is_shown) < 2 * MAX_SHOWN_STEPS
+
+
 def test_only_the_repeated_step_in_its_room_is_marked() -> None:
     program = "def task_program():\n    say('hi')\n    go_to('kitchen')\n    say('hi')\n"
     found = check(program, rooms=["hall", "kitchen"])
@@ -263,6 +273,9 @@ def test_wait_in_vain_is_harmless_unless_it_is_a_problem() -> None:
     found = check(wait, rooms=["hall"])
     number = next(one.number for one in found.samples if one.in_vain)
     assert all(strip.ends_well for strip in strips(found))
+    assert found.vain_runs.startswith(
+        f"in {sum(one.in_vain for one in found.samples)} of {len(found.samples)} "
+    )
     problem = Problem("PickInvalidObject", "there is no mug", samples=(number,))
     shown = strips(replace(found, problems=(problem,)))
     assert [one.ends_well for one in shown] == [False, *[True] * (len(shown) - 1)]

@@ -48,7 +48,8 @@ def check_view(found: CheckResult, program: str, name: str, *, shows_all: bool =
     lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
         parts += [Text(), *_problem(problem, lines)]
-    parts += [Text(), _rooms(found), *_vain_searches(found)]
+    parts += [Text(), _rooms(found)]
+    parts += [Text(f"{found.vain_runs}; this is not a problem", "dim")] if found.vain_runs else []
     parts += [Text(found.assumption, "dim")] if found.assumption else []
     for proof in found.proofs:
         parts.append(Text(f'the rule "{proof.rule}" {proof.in_words}', PROOF_STYLES[proof.verdict]))
@@ -92,13 +93,6 @@ def _rooms(found: CheckResult) -> Text:
     if not found.rooms_are_guessed:
         return Text(f"rooms: {rooms}", "dim")
     return Text(f"rooms named by the program: {rooms}\nto find misspelled rooms, add --world FILE", "yellow")
-
-
-def _vain_searches(found: CheckResult) -> Iterator[Text]:
-    count = sum(sample.in_vain for sample in found.samples)
-    if 0 < count < len(found.samples):
-        where = f"in {count} of {len(found.samples)} worlds"
-        yield Text(f"{where}, the robot waits or ends without success; this is not a problem", "dim")
 
 
 def _distinct_samples(found: CheckResult) -> list[Sample]:

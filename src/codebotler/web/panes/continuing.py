@@ -40,7 +40,8 @@ class ContinueButton(Button):
         aside = self._console.unfinished if is_other else ""
         self._mission = aside or view.id or ("" if view.past is None else view.past.mission)
         own = "Continue" if view.progress.has_begun or view.past is None else "Ask for the rest again"
-        self.text = f"Continue mission {aside} instead" if aside else own
+        self.text = "Continue the mission before instead" if aside else own
+        self.classes(add="plain" if aside else "primary", remove="primary plain")
         self.set_visibility(has_rest(view) or bool(aside))
 
     async def _continue(self) -> None:

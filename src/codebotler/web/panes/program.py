@@ -158,6 +158,7 @@ class ProgramPane:
         many = f"{count} problems" if count > 1 else "1 problem"
         self._verdict.classes(add="bad" if count else "good", remove="good" if count else "bad")
         verdict = f"{many}. The robot should not run this." if count else "Checked: no problems."
+        verdict += f" But {view.check.vain_runs}." if view.check.vain_runs and not count else ""
         if view.check.rooms_are_guessed:
             verdict += " The robot does not list its rooms; the check used the rooms named in the program."
         self._verdict.show_text(f"{verdict} {view.check.assumption}".rstrip())
