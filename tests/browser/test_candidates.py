@@ -121,7 +121,7 @@ def test_none_of_these_needs_a_sentence(tmp_path: Path, open_page: OpenPage) -> 
             assert server.call("GET", "/api/missions/current").data["phase"] == "question"
             page.get_by_label("What should be different?").fill("Speak Latin.")
             page.get_by_role("button", name="This one: option 1").click()
-            expect(page.get_by_text("words can be added only")).to_be_visible()
+            expect(page.get_by_text("text can be added only")).to_be_visible()
             page.get_by_role("button", name="None of these").click()
             expect(page.locator(".which")).to_contain_text("second question")
             page.get_by_role("button", name="You decide").click()

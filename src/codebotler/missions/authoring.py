@@ -27,12 +27,12 @@ class ModelAuthor:
         self._is_cancelled = False
 
     def write(self, prompt: Prompt, count: int, on_text: TextListener) -> tuple[str, Sequence[Attempt]]:
-        """Ask the model. Return its name and replies. Raise `asyncio.CancelledError` if `cancel` was called.
+        """Request programs. Return the model's name and replies. Raise `asyncio.CancelledError` if cancelled.
 
         Args:
             prompt: the prompt to send.
             count: how many replies to request.
-            on_text: receives the pieces of the reply as they arrive. Only called if `count` is 1.
+            on_text: called with each piece of the reply as it arrives, but only if `count` is 1.
         """
         model = self._open()
         listener = on_text if count == 1 else ignore_text
@@ -66,7 +66,7 @@ class ModelAuthor:
 
 
 def prompt_of(view: SessionView, robot: Robot, *, repair: bool) -> Prompt:
-    """Return the prompt for a mission's program. With `repair`, it lists the faults of the last reply."""
+    """Return the prompt that asks for a mission's program. `repair` adds the faults of the last reply."""
     past, room_map = view.past, view.room_map
     prompt = prompt_for(
         view.instruction,

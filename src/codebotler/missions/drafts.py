@@ -17,12 +17,12 @@ from codebotler.robots.base import Robot
 def examine_draft(
     program: str, view: SessionView, order: MissionOrder, robot: Robot, is_wanted: Callable[[], bool]
 ) -> dict[str, Any]:
-    """Check a program, and return the results as values for fields of `SessionView`, such as `check`.
+    """Check a program. Return the results as new values for fields of `SessionView`, such as `check`.
 
     Args:
         program: the program to check.
         view: the session's view, which holds the rules, the rooms and any earlier mission.
-        order: the session's order. If it has a `drive` for this program, its contract replaces the check's.
+        order: the session's order. If its `drive` replaces this program, its contract is used.
         robot: the connected robot.
         is_wanted: returns whether the result is still needed. If not, UnwantedCheckError is raised.
     """

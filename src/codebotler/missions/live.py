@@ -43,8 +43,8 @@ class StoppedError(Exception):
 class LiveRobot:
     """Executes the skills that a program calls on a connected robot, real or simulated.
 
-    `Worker.run_live` runs the program. `place` is the robot's current room, or "". The program's clock starts
-    at `clock_starts`, by default the local time. Breaking a rule of `guard` presses the stop `button`.
+    `Worker.run_live` runs the program. `place` is the robot's current room, or "" if unknown. The program's
+    clock starts at `clock_starts` (local time by default). Breaking a rule of `guard` presses `button`.
     """
 
     is_live = True
@@ -95,7 +95,7 @@ class LiveRobot:
         self._button.cancel_robot()
 
     def sleep_until(self, now: float) -> None:
-        """Wait until `self.now` reaches the argument `now`, in seconds. Raise StoppedError after a stop."""
+        """Wait until the clock `self.now` reaches `now`, in seconds. Raise StoppedError after a stop."""
         self.check_end()
         seconds = max(0.0, now - self.now)
         at = {} if self.line is None else {"line": self.line}
@@ -107,7 +107,7 @@ class LiveRobot:
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute a skill and return its result. Raise RobotError if the skill fails or a rule refuses it.
 
-        Raise StoppedError, RobotLostError, or OSError (logging failed) to end the program.
+        To end the program, raise StoppedError, RobotLostError, or OSError if logging fails.
         """
         self.check_end()
         try:
@@ -254,7 +254,7 @@ class LiveRobot:
         self.check_end()
 
     def report_unkept(self) -> str:
-        """If ending now breaks a rule, log this and return a sentence that says so; otherwise return ""."""
+        """If ending now would break a rule, log this and return a sentence about it; otherwise return ""."""
         broken = None if self._guard is None else self._guard.find_first_unkept()
         if broken is None:
             return ""
@@ -331,7 +331,7 @@ class LiveRobot:
         return check_answer(skill, self.robot.perform(skill.name, given, on_feedback))
 
     def check_end(self) -> None:
-        """Raise StoppedError or another error if the program must end. The first call starts its clock."""
+        """Raise StoppedError or another error if the program must end. The first call sets `now` to 0."""
         if self._began is None:
             self._began = self.robot.clock.now
             watch = getattr(self.robot, "watch", None)  # an optional method
@@ -344,7 +344,7 @@ class LiveRobot:
 
 
 def check_answer(skill: Skill, result: base.RobotResult) -> base.RobotResult:
-    """Return a robot's result for a skill unchanged, or raise RobotLostError if its type is wrong."""
+    """Check a robot's result for a skill. Return it, or raise RobotLostError if its type is wrong."""
     if not skill.returns.fits(result):
         raise RobotLostError(
             f"the robot answered {skill.name} with {result!r:.100}, which is not of the type "

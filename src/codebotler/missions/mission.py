@@ -202,7 +202,7 @@ class Mission:
             raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
 
     def continue_from(self, past: MissionPast) -> None:
-        """Record, before this mission runs, that it continues an earlier one, and log the earlier steps."""
+        """Record that this mission continues another, and log the earlier steps. Call this before `run`."""
         self.summary.continues = past.mission
         self.summary.write(self.folder)  # this process may be killed before the first program is checked
         self._write("past", **past.data())

@@ -38,7 +38,7 @@ def is_resumable(robot: Robot) -> bool:
 
 
 def resume_robot(robot: Robot, past: MissionPast) -> None:
-    """Put a simulated robot into the final state of the earlier mission `past`. Leave other robots alone."""
+    """Put a simulated robot into the final state of the earlier mission `past`. Ignore other robots."""
     if is_resumable(robot):
         robot.resume(past.trace)  # type: ignore[attr-defined]  # as was just found
 
@@ -49,8 +49,8 @@ def ask_rooms(
     """Ask a connected robot for its rooms and its current room. Report likely mistakes with `remark`.
 
     Returns:
-        the rooms, with footprints from `world`, or None if the robot does not list its rooms; and the
-        current room, or an empty string if the robot does not report it.
+        the rooms, with footprints from `world`, or None if the robot does not list its rooms, and the
+        robot's current room, or "" if the robot does not report it.
 
     Raises:
         NotReadyError: the robot gives no valid answer.
@@ -102,7 +102,7 @@ def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
 def expect_enforceable(
     rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None, remark: Callable[[str], None]
 ) -> None:
-    """Raise UserError or NotReadyError if a rule cannot be enforced. Tell `remark` how one can be evaded."""
+    """Raise UserError or NotReadyError if a rule cannot be enforced. Report possible evasions to `remark`."""
     rooms = () if room_map is None else room_map.goals
     for sentence in (one for rule in rules for one in unknown_rooms_in(rule, rooms)):
         raise UserError(sentence)
@@ -127,7 +127,7 @@ def expect_poses(rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None) 
 
 
 def limit_rooms(room_map: RoomMap | None, remark: Callable[[str], None]) -> RoomMap | None:
-    """Return `room_map`. If it has too many rooms for a check, tell `remark` so, and return None."""
+    """Return `room_map`, or report to `remark` and return None if it has too many rooms for a check."""
     if room_map is None or len(room_map.rooms) <= MAX_CHECKED_ROOMS:
         return room_map
     remark(
@@ -148,7 +148,7 @@ def unknown_rooms(program: str, room_map: RoomMap, skills: SkillTable = SKILLS) 
 
 
 def known_instructions(room_map: RoomMap | None) -> dict[str, str]:
-    """Return recorded instructions with their programs. With a map, only those that name its rooms."""
+    """Return recorded programs by instruction. With a map, include only those that name rooms on the map."""
     replies = open_recorded("recorded").replies
     known = {instruction: solutions[0].program for instruction, solutions in replies.items()}
 

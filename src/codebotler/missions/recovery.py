@@ -67,7 +67,7 @@ class PriorApproval:
 def is_recoverable(view: SessionView, events: Sequence[LogLine], skills: SkillTable) -> bool:
     """Whether a mission failed because a skill failed, so that a model may write a program for the rest.
 
-    False if the mission called a skill whose effect traces do not show: nobody would notice a second call.
+    False if the mission called a skill that traces do not record, because a repeated call would go unnoticed.
     """
     ends = [line for line in events if line["event"] in SKILL_END_EVENTS]
     failed = bool(ends) and ends[-1]["event"] == "error" and view.reason.startswith(f"{ends[-1]['kind']}: ")
@@ -89,8 +89,8 @@ def ask_evidence(
 ) -> list[str]:
     """Return sentences that help a person to decide whether the step `past.unsure` happened.
 
-    Connect a real robot and ask where it is. `remark` receives a sentence if this fails, for example because
-    the robot is in use or `stop_button` was pressed.
+    Connect a real robot and ask where it is. If this fails, for example because the robot is in use or
+    `stop_button` was pressed, pass a sentence that says why to `remark`.
     """
     before = [past.last_position_text] if past.last_position_text else []
     if is_resumable(robot):  # it knows no more than the log

@@ -33,7 +33,7 @@ LIMITED_SIMULATION = replace(SIMULATION, limits=Limits())  # nobody waits to sto
 
 @dataclass(frozen=True)
 class RuleEffect:
-    """How a run ended, and the house rule that stopped it. If none did: the first that refused a step."""
+    """How a run ended, and the house rule that stopped it or, failing that, the first that refused a step."""
 
     ended: str  # finished, stopped, the kind of the error, or the final state of a logged mission
     rule: str = ""
@@ -52,7 +52,7 @@ class RuleEffect:
 
 
 class NotingGuard(RuleGuard):
-    """A rule guard that also records the violations that it raises, in `violations`."""
+    """A rule guard that also collects the rule violations that it raises, in the list `violations`."""
 
     def __init__(self, rules: Sequence[Rule], world: World | None) -> None:
         super().__init__(rules, NO_ROOMS if world is None else RoomMap.of(world))
@@ -67,7 +67,7 @@ class NotingGuard(RuleGuard):
             raise
 
     def find_first_unkept(self) -> RuleViolationError | None:
-        """If ending now would break a rule, record and return this violation; otherwise return None."""
+        """If ending now would break a rule, record and return the violation; otherwise return None."""
         broken = super().find_first_unkept()
         self.violations += [broken] if broken else []
         return broken
@@ -76,7 +76,7 @@ class NotingGuard(RuleGuard):
 def find_program_effects(
     programs: Iterable[str], rules: Sequence[Rule], world: World | None, skills: SkillTable
 ) -> Iterator[RuleEffect]:
-    """Run each program once, in `world` or, if that is None, in a sampled one. Yield the effects in order."""
+    """Run each program once in `world`, or in a sampled world if it is None. Yield the effects in order."""
     sampler = first_samplers(CheckSettings())[0]
     with WorkerPool(cores()) as pool:
 
@@ -111,7 +111,7 @@ def _effect(outcome: Outcome, violations: Sequence[RuleViolationError]) -> RuleE
 
 
 def find_log_effect(path: Path, rules: Sequence[Rule], world: World | None, skills: SkillTable) -> RuleEffect:
-    """Return the first effect that rules would have had on the mission whose log is the file `path`.
+    """Return the first effect that rules would have had on the mission whose log is at `path`.
 
     If `world` is None, use the rooms of the map in the log. Raise UserError if the log is invalid, or calls a
     skill that is not in `skills`.

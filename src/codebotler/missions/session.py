@@ -49,9 +49,9 @@ _logger = logging.getLogger("codebotler.missions")
 class MissionSession(SharedView):
     """Runs one mission on its own thread, with a robot that stays connected during the whole session.
 
-    `home` contains the folder `missions`. `changed` is called after each change of the view, and must return
-    at once. The session first waits until `before` has ended. `world` is the map of the rooms. `within` is
-    the most that any program may do, or None if only rules limit programs.
+    `home` contains the folder `missions`. `changed` is called after each change of the view and must not
+    block. The session first waits for the session `before` to end. `world` is the map of the rooms. `within`
+    limits what any program may do, in addition to the rules, unless it is None.
     """
 
     def __init__(
@@ -89,14 +89,14 @@ class MissionSession(SharedView):
         self._thread.start()
 
     def join(self, seconds: float | None = None) -> None:
-        """Wait until the session has ended, for at most `seconds` if they are given."""
+        """Wait until the session has ended, or at most `seconds` if given."""
         self._thread.join(seconds)
 
     def edit(self, program: str) -> None:
         """Replace the program and check it in the background. Raise MissionError if edits are not allowed."""
         with self._editing, self._lock:
             if self._view.is_over or not self._view.may_be_edited:
-                raise MissionError("the program cannot be changed while a model writes or after approval")
+                raise MissionError("the program cannot be changed while a model is writing or after approval")
             self._next_task = partial(self._take, program=program)
             self.is_changed_by_person = True
             self._change(program=program, author="", question=None, disabled_rules=(), **UNCHECKED)
@@ -142,7 +142,7 @@ class MissionSession(SharedView):
         last question, `none` ends the mission.
 
         Raises:
-            MissionError: the question is not open, there is no such option, or `more` came without `none`.
+            MissionError: the question is closed, there is no such option, or `more` was given without `none`.
         """
         with self._editing, self._lock:
             view = self._view
@@ -151,7 +151,7 @@ class MissionSession(SharedView):
             if isinstance(answer, int) and not 0 <= answer < len(question.options):
                 raise MissionError(f"there is no option {answer + 1}; choose 1 to {len(question.options)}")
             if answer != "none" and more.strip():
-                raise MissionError('words can be added only to "none of these"; choose it, or leave them out')
+                raise MissionError('text can be added only to "none of these"; choose that, or omit the text')
             self.is_changed_by_person |= bool(more.strip())
             self._next_task = partial(
                 self._take_answer, question=question, answer=answer, more=" ".join(more.split())
@@ -169,16 +169,16 @@ class MissionSession(SharedView):
     ) -> None:
         """Approve the program whose digest is `seen`. Raise MissionError if it cannot be approved now.
 
-        `disabled_rules` are those that the person saw switched off, or None to skip this comparison. `by`
-        says in the log who approved. `is_person` is False if nobody decides now, because an earlier approval
-        covers the program; then MissionError is raised if a person has changed the program since.
+        `disabled_rules` are the rules that the person saw switched off, or None to skip this comparison. `by`
+        names the approver in the log. `is_person` is False if an earlier approval covers the program, which
+        a person must not have changed since.
         """
         with self._editing:
             view, mission = self._view, self._mission
             if self._is_stopped:
                 raise MissionError("the mission is being stopped; its program cannot be approved")
             if mission is None or view.busy or view.question is not None:
-                raise MissionError("the program is not checked yet, or a question is open; wait or answer it")
+                raise MissionError("no program is ready yet; wait for the check, or answer the open question")
             if seen != view.digest or seen != program_digest(mission.summary.program):
                 raise MissionError("the program has changed; review the new program")
             if disabled_rules is not None and disabled_rules != view.disabled_rules:

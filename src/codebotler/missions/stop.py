@@ -66,11 +66,11 @@ class StopButton:
 
     @property
     def seconds(self) -> float:
-        """Seconds from the first press until the robot had the request, or until now if it has not yet."""
+        """Seconds from the first press until the robot received the stop request, or until now if pending."""
         return max(0.0, min(self._reached_at, time.monotonic()) - self._pressed_at)
 
     def why_unstopped(self) -> str:
-        """Return why the robot was not stopped, or "" if it was or gives no reason. Wait up to 6 seconds."""
+        """Return why the robot did not stop, or "" if it did or gives no reason. Wait up to 6 seconds."""
         if self.ended.is_set():
             self._has_reached.wait(STOP_REQUEST_SECONDS)
         return str(getattr(self.robot, "failed_stop", ""))  # optional

@@ -68,7 +68,7 @@ class Detector(Protocol):
 
 
 class PerceptionError(Exception):
-    """Raised if a detector failed. Its `sentence` gives the reason and contains no API keys."""
+    """Raised when a detector fails. Its `sentence` gives the reason, without any API keys."""
 
     def __init__(self, sentence: str) -> None:
         super().__init__(sentence)

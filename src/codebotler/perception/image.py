@@ -32,7 +32,7 @@ ENCODINGS: Mapping[str, tuple[str, str]] = {
 
 
 def decode_image(data: bytes, name: str = "the picture") -> Image.Image:
-    """Decode a JPEG, PNG or WebP file to an upright RGB image, or raise UserError, which mentions `name`."""
+    """Decode a JPEG, PNG or WebP file to an upright RGB image. On failure, raise UserError about `name`."""
     if not data:
         raise UserError(f"{name} is empty; use a JPEG, PNG or WebP image")
     if len(data) > MAX_IMAGE_BYTES:
@@ -59,7 +59,7 @@ def read_image(path: Path) -> Image.Image:
 def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> Image.Image:
     """Decode a ROS message: a sensor_msgs/CompressedImage, or a sensor_msgs/Image in one of `ENCODINGS`.
 
-    The message is a dict with `data` in base64. Raise UserError, which mentions `name`, for a bad image.
+    The message is a dict with `data` in base64. If the image is bad, raise UserError about `name`.
     """
     try:
         data = base64.b64decode(message["data"], validate=True)  # type: ignore[arg-type]  # a text, or an error

@@ -41,7 +41,7 @@ class ZeroShotDetector:
             raise UserError(f"{self.name} has weights that are infinite or not numbers; use another model")
 
     def look(self, image: Image, label: str) -> Sighting:
-        """Look for a label in an image. The best match is found if its score is at least `least_score`."""
+        """Look for a label in an image. The best match counts if its score is at least `least_score`."""
         words = clean_label(label)
         self._check_length(words)
         try:

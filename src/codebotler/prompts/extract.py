@@ -44,7 +44,7 @@ class ReplyContent:
 
 
 def read_reply(reply: str, *, continues: bool = False) -> ReplyContent:
-    """Split a model's complete reply into a program and reasoning, as `program_of` explains.
+    """Split a model's complete reply into a program and reasoning, as `program_of` describes.
 
     Raises:
         EngineError: no isolated process can be started.
@@ -60,15 +60,15 @@ def program_of(reply: str, *, continues: bool = False) -> Program:
     """Return the program in a model's complete reply.
 
     If `task_program` is defined several times, the last complete definition counts. Reasoning between markers
-    such as `<think>` and `</think>` is dropped. So is text between other markers if a program follows. Apart
+    such as `<think>` and `</think>` is dropped, as is text between other markers if a program follows. Apart
     from this, only chat template tokens, fences and lines that are certainly not code are dropped. A program
     that was cut off is not completed.
 
     Args:
         reply: code with or without fences and prose, or only the indented body of `task_program`. A reply
             that takes seconds to parse is returned unchanged.
-        continues: whether a base model continued the prompt; if so, the first definition counts, and further
-            examples are dropped.
+        continues: whether a base model continued the prompt; if so, the first definition counts, and any
+            further examples are dropped.
 
     Raises:
         EngineError: no isolated process can be started.

@@ -48,7 +48,7 @@ def is_prose(line: str) -> bool:
 
 
 def continues_prose(line: str) -> bool:
-    """Whether a line that follows prose is prose, too, since it is neither blank nor code."""
+    """Whether a line after prose continues the prose, that is, whether it is neither blank nor code."""
     return bool(line.strip()) and not is_code(without_residue(line))
 
 
@@ -67,20 +67,20 @@ def is_residue(line: str) -> bool:
 
 
 def trim(lines: Sequence[str]) -> Sequence[str]:
-    """Return the lines without those at both ends that are blank or only chat template tokens."""
+    """Strip lines from both ends that are blank or contain only chat template tokens."""
     kept = [i for i, line in enumerate(lines) if not is_residue(line)]
     return lines[kept[0] : kept[-1] + 1] if kept else []
 
 
 def without_residue(line: str) -> str:
-    """Return a line without chat template tokens at both ends, and without a code fence at its end."""
+    """Strip chat template tokens from both ends of a line, and a code fence from its end."""
     while (shorter := RESIDUE.sub("", line)) != line:
         line = shorter
     return line
 
 
 def parse_lines(lines: Sequence[str]) -> ast.Module | None:
-    """Return the syntax tree of some lines, or None if they are not valid Python."""
+    """Parse lines of code. Return their syntax tree, or None if they are not valid Python."""
     return _parse_text("\n".join(lines))
 
 

@@ -40,7 +40,7 @@ class PromptMessage:
 
 @dataclass(frozen=True)
 class PictureMessage(PromptMessage):
-    """A turn with a picture, which is a JPEG file."""
+    """A turn that includes a picture, as a JPEG file."""
 
     jpeg: bytes
 
@@ -66,11 +66,11 @@ class Prompt:
     last_step: str = ""  # of the mission whose rest is requested, in words; empty for a new mission
 
     def after(self, program: str, problems: Sequence[str]) -> Prompt:
-        """Return this request, followed by a program and by its problems, which the model is asked to fix."""
+        """Return this prompt, followed by a program and a request to fix its problems."""
         return self._followed("repair", program, problems=list_lines(problems))
 
     def to_continue(self, program: str, steps: Sequence[str], why: str, here: str, last_step: str) -> Prompt:
-        """Return this request, followed by one to write the rest of a mission that ended early.
+        """Return this prompt, followed by a request to write the rest of a mission that ended early.
 
         Args:
             program: the program that the robot ran.
@@ -92,7 +92,7 @@ class Prompt:
         return replace(self, messages=(*self.messages, answer, request), text=text)
 
     def after_no_program(self, why: str) -> Prompt:
-        """Return this chat prompt with the reason why the last reply had no program."""
+        """Return this prompt for chat models, with the reason why the last reply had no program."""
         *before, request = self.messages
         asked = f"{request.text}\n\n{fill_template('no-program', why=why)}"
         return replace(self, messages=(*before, replace(request, text=asked)))
@@ -170,7 +170,7 @@ def prompt_for(
 
 
 def stub(skill: Skill) -> str:
-    """Return a skill as prompts show it: as a Python function. Custom skills get an example call, too."""
+    """Return a skill as a Python stub for prompts. The stub of a custom skill includes an example call."""
     lines = [skill.doc.replace('"""', "'''")]
     if skill.fails:
         lines.append(f"Fails with an exception if {listed([when for _, when in skill.fails], 'or if')}.")
@@ -208,7 +208,7 @@ def _template(name: str) -> Template:
 
 
 def fill_template(name: str, **values: str) -> str:
-    """Return the text of the file `name`.txt in this folder, with values in place of its variables."""
+    """Return the text of the file `name`.txt in this folder, with its variables replaced by `values`."""
     return _template(name).substitute(values).rstrip("\n")
 
 

@@ -53,7 +53,7 @@ class Segment:
 
 
 def answer_of(reply: str, parses: ParseTest) -> tuple[list[Segment], str]:
-    """Return the answer in a reply, as segments of fenced code and text, and the reasoning, as text.
+    """Split a reply into its answer, as segments of fenced code and text, and its reasoning, as text.
 
     Everything before an unmatched closing marker is reasoning, since the opening marker may be in the prompt.
     A closing marker at the very end, after other reasoning, is ignored.

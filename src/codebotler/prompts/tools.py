@@ -31,7 +31,7 @@ class Tool:
 
 @dataclass(frozen=True)
 class ToolCall:
-    """A call of a tool that a model requests."""
+    """A tool call that a model requests."""
 
     id: str  # links the result to the call
     name: str
@@ -115,7 +115,7 @@ def _schema(value: ValueType) -> dict[str, Any]:
 
 
 def object_schema(properties: dict[str, Any]) -> str:
-    """Return the JSON Schema, as text, of an object with exactly these properties (name to schema)."""
+    """Return, as text, the JSON Schema of an object with exactly these `properties` (schemas by name)."""
     closed = {"required": [*properties], "additionalProperties": False}
     return json.dumps({"type": "object", "properties": properties, **closed})
 

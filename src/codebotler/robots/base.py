@@ -134,7 +134,7 @@ class CancelledError(Exception):
 
 @dataclass(frozen=True)
 class Readiness:
-    """Says whether a kind of robot, such as ros2, works on this machine, or else how to make it work."""
+    """Whether a kind of robot, such as ros2, works on this machine and, if not, how to make it work."""
 
     name: str  # the kind: sim, pyrobosim, ros1, rosbridge or ros2
     works: bool  # whether all requirements are installed; the robot itself is not contacted

@@ -91,7 +91,7 @@ class Face:
             self._add_screens(-1)
 
     def open(self) -> None:
-        """Clear the face for a new mission. The robot can speak and ask until `withdraw` is called."""
+        """Clear all screens for a new mission, and let the robot speak and ask until `withdraw` is called."""
         with self._lock:
             self._is_open = True
             self._show(FaceState())
@@ -113,7 +113,7 @@ class Face:
 
         Raises:
             RobotError: nobody answered in time.
-            CancelledError: the question was withdrawn, or the mission was stopped before.
+            CancelledError: the question was withdrawn, or the mission had already been stopped.
         """
         with self._lock:
             until = time.monotonic() + self._seconds
@@ -133,7 +133,7 @@ class Face:
         return ended.answer
 
     def answer(self, number: int, option: int) -> None:
-        """Answer question `number` with an option's index. Raise AnswerError if that is late or invalid."""
+        """Answer question `number` with an option's index. Raise AnswerError if it is too late or invalid."""
         with self._lock:
             question = self.shown.question
             if question is None or question.number != number:
@@ -191,7 +191,7 @@ class RobotWithFace:
         }
 
     def connect(self) -> None:
-        """Connect the wrapped robot and clear the face."""
+        """Connect the wrapped robot and clear the screens."""
         self._robot.connect()
         self._face.open()
 

@@ -103,7 +103,7 @@ class SpellingRobot:
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Perform a skill, with names spelled as the robot does. Return a result in composed form (NFC)."""
+        """Perform a skill, with names in the robot's spelling. Return its result in composed form (NFC)."""
         given = [self._spellings.get(one, one) if isinstance(one, str) else one for one in arguments]
         result = self._robot.perform(skill, given, feedback)
         for text in result if isinstance(result, list) else [result]:

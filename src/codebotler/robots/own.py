@@ -88,7 +88,7 @@ class OwnRobot:
         return method if callable(method) else None
 
     def connect(self) -> None:
-        """Call the object's `connect`, if any, and set the clock to 0. Raise NotReadyError if that fails."""
+        """Call the user's `connect` method, if any, and reset `clock`. Raise NotReadyError if this fails."""
         if not self._stop_returned.is_set():
             raise NotReadyError(f"an earlier call of {self.name}.stop has not returned; check the robot")
         if self._loop is None:
@@ -151,7 +151,7 @@ class OwnRobot:
         raise CancelledError
 
     def cancel(self) -> None:
-        """Call the object's `stop`, wait up to 5 s for its end, and cancel a running async method."""
+        """Call the user's `stop` method, wait up to 5 s for it, and cancel a running async method."""
         with self._stop_lock:
             self._stopped = True
             if self._stop_returned.is_set():
@@ -177,7 +177,7 @@ class OwnRobot:
             self._stop_returned.set()
 
     def disconnect(self) -> None:
-        """Stop a running method, call the object's `disconnect` if it has one, and end the event loop."""
+        """Stop a running method, call the user's `disconnect` method, if any, and end the event loop."""
         if self._is_busy:
             self.cancel()
         self._stopped = True

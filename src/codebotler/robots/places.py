@@ -42,12 +42,12 @@ class Places:
     places: tuple[NamedPlace, ...]
 
     def world(self, robot: str = "") -> World:
-        """Return a world with these places as its rooms. `robot` names the one where the robot starts."""
+        """Return a world with these places as its rooms. `robot` is the name of the starting room."""
         rooms = (Room(one.name, footprint=one.polygon, stand_at=(one.x, one.y)) for one in self.places)
         return World(tuple(rooms), robot)
 
     def room_at(self, x: float, y: float) -> NamedPlace | None:
-        """Return the place whose polygon contains a point in metres (the smallest one), or None."""
+        """Return the smallest place whose polygon contains a point in metres, or None if there is none."""
         around = (one for one in self.places if one.polygon and is_within((x, y), one.polygon))
         return min(around, key=lambda one: _area(one.polygon or ()), default=None)
 
@@ -70,7 +70,7 @@ class _PlacesForm(BaseModel):
 
 
 class PlacesFile(_PlacesForm):
-    """The structure of a places file in CodeBotler's own format: a frame, and each place by its name."""
+    """The structure of a places file in CodeBotler's own format: a frame, and the places by name."""
 
     frame: Name = "map"
     places: dict[Name, dict[Literal["x", "y", "yaw", "polygon"], Any]]
@@ -106,7 +106,7 @@ def read_places(source: object, at: YamlFile) -> Places:
         file = YamlFile.read(Path(at.name).parent / mapping.file)
         frames.append(file.validate(PlacesFile).frame if isinstance(one, str) else mapping.frame)
         if frames[-1] != frames[0]:
-            raise at.wrong(f'the frame is "{frames[-1]}" here, but "{frames[0]}" above; use the same', *here)
+            raise at.wrong(f'the frame is "{frames[-1]}" here, but "{frames[0]}" above; use one frame', *here)
         entries = [*_find_entries(mapping, file.data)]
         if not entries:
             sentence = f'"{mapping.each}" matches no named place in {file.name}'

@@ -94,13 +94,13 @@ class Reservation:
 
 
 def robot_file(robot: str, address: str, kind: str) -> Path:
-    """Return the path of a user's file for a robot of kind `robot`. `kind` is a suffix, such as lock."""
+    """Return the path of this user's file for the robot at `address`. `kind` is a suffix such as `lock`."""
     digest = sha256(normalize_address(address).encode(errors="surrogatepass")).hexdigest()
     return lock_folder() / f"{robot} {digest}.{kind}"
 
 
 def lock_folder() -> Path:
-    """Return (and create) this user's folder for locks. Raise NotReadyError if others can write to it."""
+    """Return this user's lock folder, created if missing. Raise NotReadyError if others can write to it."""
     # No variable chooses it, since clients of agents start their servers without those of a shell, and it is
     # not below /run/user, which begins and ends with logins.
     folder = LOCKS_IN / f"codebotler-{os.getuid()}"
@@ -124,7 +124,7 @@ def _is_ours(folder: Path) -> bool:
 
 
 def normalize_address(address: str) -> str:
-    """Return an address in a form for comparison: with a port, a lower-case host, and no user or final slash.
+    """Return an address in a comparable form: with a port, a lower-case host, and no user or final slash.
 
     Names of this machine become 127.0.0.1, and invalid addresses stay unchanged. Connect to the original
     address, since a server may listen on only one of its machine's names.

@@ -42,7 +42,7 @@ OFFICE = Path(__file__).with_name("office.yaml")
 
 
 class Simulated:
-    """A simulated robot that needs time to drive and to perform its other skills.
+    """A simulated robot that takes time to drive and to perform its other skills.
 
     Args:
         world: the world that the robot works in.

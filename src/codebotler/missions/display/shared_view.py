@@ -12,7 +12,7 @@ from codebotler.missions.storage.log import LogLine
 
 
 class SharedView:
-    """Holds a session's latest view and events. `changed`, called after each change, must return at once."""
+    """Holds a session's latest view and events. `changed` is called after each change and must not block."""
 
     def __init__(self, view: SessionView, changed: Callable[[], None]) -> None:
         self._view, self._changed = view, changed
@@ -34,17 +34,17 @@ class SharedView:
 
     @property
     def is_stuck(self) -> bool:
-        """Whether a skill still runs after a stop that the robot did not confirm, so the robot may move."""
+        """Whether a skill is still running after a stop that the robot did not confirm, so it may move."""
         stuck = None if self._mission is None else self._mission.stuck
         return stuck is not None and stuck.is_alive()
 
     @property
     def may_move(self) -> bool:
-        """Whether the robot may still move after the mission, since it was lost or did not confirm a stop."""
+        """Whether the robot may still be moving, because it was lost or did not confirm a stop."""
         return self._mission is not None and self._mission.may_move
 
     def events(self, start: int = 0) -> list[LogLine]:
-        """Return the events of the mission so far, oldest first, without the first `start` ones."""
+        """Return the mission's events so far, oldest first, starting at index `start`."""
         return self._events[start:]
 
     def _add_remark(self, sentence: str) -> None:

@@ -41,7 +41,7 @@ Phase: TypeAlias = MissionState | Literal["", "starting", "writing", "checking",
 class MissionOrder:
     """A request for a mission: an instruction for a model, or a program.
 
-    Raises UserError if both are empty, or if nobody has said whether the last step of `past` happened.
+    Raises UserError if both are empty, or if a person must first say whether `past`'s last step happened.
     """
 
     instruction: str = ""
@@ -61,7 +61,7 @@ class MissionOrder:
             clean_instruction(self.instruction)
 
     def first_view(self, number: int, rules: tuple[Rule, ...], within: Contract | None) -> SessionView:
-        """Return the view with which session `number` begins. `within` limits what its programs may do."""
+        """Return the initial view of session `number`, with its house `rules` and any limit `within`."""
         return SessionView(
             number,
             instruction=self.instruction,
@@ -123,7 +123,7 @@ class SessionView:
 
     @property
     def contract(self) -> Contract | None:
-        """The upper bound, derived by the check, of what the program may do; None if there is none."""
+        """The upper bound on what the program may do, as derived by the check, or None if there is none."""
         return None if self.check is None else self.check.contract
 
     @property
@@ -133,7 +133,7 @@ class SessionView:
 
     @property
     def can_run(self) -> bool:
-        """Whether the program has no syntax error, so it can start. People can accept other problems."""
+        """Whether the program can start, that is, has no syntax error. People can accept other problems."""
         return self.check is None or not any(one.kind in _SYNTAX_ERRORS for one in self.check.problems)
 
     @property
@@ -148,7 +148,7 @@ class SessionView:
 
     @property
     def phase(self) -> Phase:
-        """The session's work, such as `writing`, or else its mission's state; "" if there is neither."""
+        """What the session is doing, such as `writing`, or else its mission's state, or "" if neither."""
         if self.is_over or self.is_running:
             return "" if self.state is None else self.state
         if self.is_written:
@@ -195,7 +195,7 @@ class SessionView:
 
     @property
     def may_be_edited(self) -> bool:
-        """Whether a person can edit the program now. After the session, they edit it for a new mission."""
+        """Whether a person can edit the program now. After the session, edits are for a new mission."""
         if self.is_over or self.is_written:
             return self.is_over
         waits = self.state is None and bool(self.program)  # for the robot; edits are kept until then

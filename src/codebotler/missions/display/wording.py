@@ -23,13 +23,13 @@ _STATES_IMPLIED_BY_STOP = frozenset({MissionState.STOPPING, MissionState.STOPPED
 
 
 def event_text(line: LogLine) -> str:
-    """Return an event in words, such as `drives to "kitchen"`, or "" if people do not see the event."""
+    """Return an event in words, such as `drives to "kitchen"`, or "" if the event is not shown."""
     words = _EVENT_WORDERS.get(line["event"])
     return words(line) if words else ""
 
 
 def timeline(events: Iterable[LogLine]) -> Iterator[tuple[LogLine, str]]:
-    """Yield the events to show to people, each with a description. Leave out feedback and repetitions."""
+    """Yield the events to show to people, each with a description. Skip feedback and repetitions."""
     before, is_stopped = "", False
     for number, line in enumerate(events):
         words = event_text(line) if number else "mission created"
@@ -55,12 +55,12 @@ def stop_text(by: str) -> str:
 
 
 def reason_text(reason: str, line: int | None) -> str:
-    """Return `reason`, after the number of the program's line if known, as in `line 3: no such room`."""
+    """Return `reason`, prefixed with the program's line if known, as in `line 3: no such room`."""
     return reason if line is None else f"line {line}: {reason}"
 
 
 def capitalize(words: str) -> str:
-    """Return words with a capital first letter. The other letters stay as they are."""
+    """Return a text with its first letter capitalized and the other letters unchanged."""
     return words[:1].upper() + words[1:]
 
 

@@ -38,7 +38,7 @@ def frame_transform(at: Point, heading: float, time: int) -> Message:
 
 
 def log_line(level: int, message: str, name: str, line: int | None, time: int) -> Message:
-    """Build a log message. `level`: 1 (debug) to 4; `name`: of a skill or event; `time`: ns since 1970."""
+    """Build a log message about the skill or event `name`. `level`: 1 to 4 (error). `time`: ns since 1970."""
     where = {"file": "", "line": 0} if line is None else {"file": "program.py", "line": line}
     return {"timestamp": _time(time), "level": level, "message": message, "name": name, **where}
 

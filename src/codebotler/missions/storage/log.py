@@ -129,7 +129,7 @@ def open_log(folder: Path) -> Appender:
 
 
 def add_event(log: Appender, event: str, clock: float, **data: object) -> LogLine:
-    """Append an event of the kind `event` to a log, and return it. `clock`: seconds on the robot's clock."""
+    """Append an event of kind `event` to a log and return it. `clock` is the robot's clock, in seconds."""
     line = {"time": round(time.time(), 6), "clock": round(clock, 6), "event": event, **data}
     log.append(to_line(line))
     return line
@@ -163,7 +163,7 @@ SKILL_END_EVENTS = frozenset({"result", "error", "cancelled", "late"})
 
 
 def find_skill_end(events: Sequence[LogLine], number: int) -> LogLine | None:
-    """Return the first event from index `number` on that ends a skill, such as `result`, or None."""
+    """Return the first event at or after index `number` that ends a skill, such as `result`, or None."""
     later = (events[at] for at in range(number, len(events)))
     return next((line for line in later if line["event"] in SKILL_END_EVENTS), None)
 

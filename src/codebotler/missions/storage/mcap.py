@@ -66,8 +66,8 @@ def write_mcap(
 ) -> None:
     """Write a mission as MCAP, with topics for each skill, the states, the log, the poses and the rooms.
 
-    The program is added as an attachment. Times come from the wall clock, or from the robot's clock, which
-    then starts when the mission was created. Pictures are read from `folder`, unless it is None.
+    The program is added as an attachment. Times come from the wall clock, or from the robot's clock, counted
+    from the creation of the mission. Pictures are read from `folder`, or left out if it is None.
     """
     began = round(min(summary.created * SECOND_NS, MAX_TIME_NS))
     path = _RobotPath()
@@ -165,7 +165,7 @@ class _RobotPath:
 
 
 def schema_of(values: Sequence[Any]) -> dict[str, Any]:
-    """Return a JSON schema for all values. Mixed types become text, as Foxglove has no union types."""
+    """Return a JSON schema that fits all values. Mixed types become text, as Foxglove lacks union types."""
     types = {_json_type(value) for value in values}
     kind = types.pop() if len(types) == 1 else "number" if types == {"integer", "number"} else "string"
     if kind == "object":
@@ -210,7 +210,7 @@ def export_mcap(
     clock: TimeSource,
     folder: Path | None = None,
 ) -> None:
-    """Write a mission to an MCAP file, atomically. Raise UserError if `path` is a file of another kind."""
+    """Write a mission to an MCAP file, atomically. Raise UserError if `path` is a file of another format."""
     expect_replaceable(path, b"\x89MCAP")
     whole = io.BytesIO()
     write_mcap(whole, summary, events, folder=folder, clock=clock)

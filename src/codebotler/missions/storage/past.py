@@ -37,7 +37,7 @@ DONE_EVENTS = frozenset({"result", "late"})
 
 @dataclass(frozen=True)
 class MissionPast:
-    """What the robot did in an ended mission and those before it, so that a new one can do the rest.
+    """What the robot did in an ended mission and its predecessors, so that a new mission can do the rest.
 
     Args:
         mission: the ID of the ended mission.
@@ -48,7 +48,7 @@ class MissionPast:
         trace: what the robot did and saw, with rooms and objects named as in the programs.
         place: where the robot was last; empty if unknown.
         unsure: a step that may or may not have happened, such as a cancelled `say`; None if there is none.
-        before: how many steps of `trace` earlier missions did, before this program.
+        before: how many steps of `trace` were done by earlier missions.
         has_failed: whether the mission failed, rather than being stopped or interrupted.
         testimony: what people said about unsure steps, in a sentence.
     """
@@ -67,7 +67,7 @@ class MissionPast:
 
     @property
     def is_untouched(self) -> bool:
-        """Whether the robot neither did nor tried anything, so that the whole program can still run."""
+        """Whether the robot has neither done nor tried anything, so that the whole program can still run."""
         return bool(self.program) and not (self.trace or self.unsure or self.has_failed)
 
     @property
@@ -97,12 +97,12 @@ class MissionPast:
         return [_step_words(event) for event in self.trace if not event.failed]
 
     def position_text(self, place: str) -> str:
-        """Return a sentence that says that the robot is at `place`, and what it holds."""
+        """Return a sentence that says that the robot is in the room `place` and what it holds."""
         return f'The robot is in "{shortened(place)}" and holds {self._held_words}.'
 
     @property
     def last_position_text(self) -> str:
-        """A sentence that says where the robot was last and what it held, by the log; empty if unknown."""
+        """A sentence that says where the robot last was and what it held, as logged, or "" if unknown."""
         where = f'the robot was in "{shortened(self.place)}" and held {self._held_words}'
         return f"Just before that, {where}, says the log." if self.place else ""
 
@@ -112,7 +112,7 @@ class MissionPast:
 
     @property
     def unsure_step_text(self) -> str:
-        """A clause that tells a person which step may have happened; empty if `unsure` is None."""
+        """A clause that tells a person which step may have happened, or "" if `unsure` is None."""
         if self.unsure is None:
             return ""
         return f"the robot began this, but the log does not say whether it happened: {self._unsure_words}"
@@ -129,14 +129,14 @@ class MissionPast:
         return () if self.unsure is None else tuple(option.text for option in self.unsure.options)
 
     def resolve(self, *, happened: bool, answer: str = "") -> MissionPast:
-        """Return a copy in which a person has said whether the step `unsure` happened.
+        """Return a copy that records what a person said: whether the step `unsure` happened.
 
         Args:
             happened: whether the step happened.
             answer: the answer, if the step is a question; empty if nobody knows the answer.
 
         Raises:
-            UserError: the answer is none of the options.
+            UserError: the answer is not one of the options.
         """
         if self.unsure is None:
             return self
@@ -150,13 +150,13 @@ class MissionPast:
         return replace(self, trace=trace, unsure=None, testimony=testimony)
 
     def add_to(self, room_map: RoomMap | None, place: str) -> tuple[RoomMap, str]:
-        """Return the map with these steps, and the robot's room: `place` or, if empty, the last known."""
+        """Add these steps to a map. Return it and the robot's room: `place`, or the last known one."""
         place = place or self.place
         known = RoomMap((place,), place, guessed=True) if room_map is None else room_map
         return replace(known, start=known.room(place) or known.start, past=self.trace), place
 
     def data(self) -> dict[str, object]:
-        """Return the data of the `past` event with which the new mission logs these steps."""
+        """Return the data of the `past` event, in which the new mission logs these steps."""
         return {
             "continues": self.mission,
             "why": self.why,
@@ -310,7 +310,7 @@ class LoggedRobot(SimulatedRobot):
 
 
 def arguments_in(line: LogLine, skills: SkillTable) -> list[Argument]:
-    """Return the arguments of a logged skill call in a robot's types, with tuples for lists."""
+    """Return a logged skill call's arguments in the types that robots expect, such as tuples for lists."""
     given = zip(skills[line["skill"]].parameters, line["arguments"].values(), strict=True)
     listed = [to_options(value) if parameter.is_options else value for parameter, value in given]
     return [tuple(value) if isinstance(value, list) else value for value in listed]

@@ -30,7 +30,7 @@ _MISSION_ID = re.compile(r"\d{8}-\d{6}(-\d{1,6})?", re.ASCII)
 
 
 def read_missions(home: Path, most: int | None = None) -> list[MissionSummary]:
-    """Read the last `most` mission summaries, or all, oldest first. Raise UserError if one is damaged."""
+    """Read all or the last `most` mission summaries, oldest first. Raise UserError if one is damaged."""
     folders = _mission_folders(home)[-most if most else 0 :]
     return sorted(map(MissionSummary.read, folders), key=lambda summary: (summary.created, summary.id))
 
@@ -55,7 +55,7 @@ def find_rest(folder: Path) -> MissionSummary | None:
 
 
 def rests_in(known: Sequence[MissionSummary]) -> dict[str, MissionSummary]:
-    """Return a dict from the ID of a mission to the mission that continued it, if the latter ran."""
+    """Map the ID of each mission to the mission that continued it. Skip continuations that never ran."""
     return {one.continues: one for one in known if one.if_tool_dies and one.continues}
 
 
@@ -74,7 +74,7 @@ def rest_text(rest: MissionSummary | None) -> str:
 
 
 def recover_missions(home: Path) -> list[MissionSummary]:
-    """Mark missions as interrupted if their process has ended, report them on stderr, and return them."""
+    """Mark missions whose process has ended as interrupted, report them on stderr, and return them."""
     found: list[MissionSummary] = []
     for folder in _mission_folders(home):
         try:
@@ -90,7 +90,7 @@ def recover_missions(home: Path) -> list[MissionSummary]:
 
 
 def find_interrupted(home: Path) -> list[MissionSummary]:
-    """Call `recover_missions`. Return its result, and the last mission that ran if interrupted before."""
+    """Call `recover_missions`. Return its result, plus the last mission that ran if it was interrupted."""
     found = recover_missions(home)
     with suppress(UserError):
         ran = [one for one in read_missions(home, RECENT_MISSIONS) if one.if_tool_dies]

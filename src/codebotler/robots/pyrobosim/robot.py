@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Pyrobosim(Simulated):
-    """A robot in pyrobosim, which drives around walls, and to a table to pick or place an object."""
+    """A robot in the simulator pyrobosim. It avoids walls, and picks and places objects at tables."""
 
     name = "pyrobosim"
     if_tool_dies = "the robot in pyrobosim ended as well"

@@ -72,7 +72,7 @@ class DrivableWorld:
         return next((name for name, floor in self._rooms.items() if floor.is_inside(pose)), None)
 
     def put_robot(self, room: str) -> None:
-        """Put the robot at its stopping position in a room, without a drive."""
+        """Put the robot at its stopping position in a room without driving there."""
         self.robot.set_pose(self._pose(room))
 
     def drive(self, room: str, feedback: Feedback) -> None:

@@ -38,12 +38,12 @@ class Timeouts:
 
 
 class RosCaller:
-    """Calls actions, services and topics on ROS, by default an action for each skill.
+    """Performs skills through ROS actions, services and topics, by default an action for each skill.
 
     Args:
         name: the kind of robot, such as ros2.
         address: the robot's address, such as the URI of a ROS master.
-        script: the worker's script: the name of a file in `workers/`, or a path.
+        script: the worker's script, as the name of a file in `workers/` or a path.
         options: the options for opening the robot. With a virtual robot, the speed must equal its speed.
         environment: additional environment variables for the worker.
         waits: the time limits.
@@ -148,7 +148,7 @@ class RosCaller:
             return self._worker, self._number
 
     def cancel(self) -> None:
-        """Have the worker cancel the robot's goal. If the worker hangs or is dead, a new one cancels all."""
+        """Have the worker cancel the robot's goal. If it hangs or is dead, a new worker cancels all goals."""
         has_lock = self._send_lock.acquire(timeout=CANCEL_SECONDS)  # a hanging worker can block its owner
         try:
             self._stopped = True
@@ -214,7 +214,7 @@ class RosCaller:
 
 
 def calls_data(connection: Connection) -> WorkerMessage:
-    """Return for each skill its call's kind, server, type and definition, as data for a worker."""
+    """Return the kind, server, type and definition of each skill's call, as data for a worker."""
     return {
         skill: {"kind": call.kind, "server": call.name, "type": call.type, "definition": call.definition}
         for skill, call in connection.calls.items()

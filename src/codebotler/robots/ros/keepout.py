@@ -18,10 +18,10 @@ EMPTY_MASK = ((0.0, 0.0), (MASK_RESOLUTION, MASK_RESOLUTION))  # one free cell, 
 def keepout_messages(
     rules: Sequence[Rule], rooms: Sequence[Room], frame: str = "map", topic: str = "/keepout_filter_mask"
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return a keepout mask (nav_msgs/OccupancyGrid) and its nav2_msgs/CostmapFilterInfo as plain data.
+    """Return Nav2's keepout mask (an OccupancyGrid) and the CostmapFilterInfo that describes it, as dicts.
 
-    The mask covers the rooms that rules `always: not tr.Exists(inside(...))` forbid; other rules are ignored.
-    `frame` is the coordinate frame of the rooms, and `topic` the topic for the mask.
+    The mask covers each room that a rule `always: not tr.Exists(inside(...))` forbids. Other rules are
+    ignored. `frame` is the coordinate frame of the rooms, and `topic` is where the mask will be published.
     """
     patterns = [element for rule in rules if rule.when == "always" for element in _forbidden(rule.formula)]
     zones = [r.footprint for r in rooms if r.footprint and any(e.text.matches(r.name) for e in patterns)]

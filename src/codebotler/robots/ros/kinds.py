@@ -28,18 +28,18 @@ INSTALL_ROS2 = "pip install 'codebotler[ros2]'"
 
 
 def ros1(options: Options, waits: Timeouts | None = None) -> RosRobot:
-    """Create a robot on ROS 1, whose worker runs actionlib under the robot's Python.
+    """Create a robot on ROS 1. Its worker process uses actionlib and runs under the robot's Python.
 
-    Its address is the URI of a master, by default ROS_MASTER_URI. Raise UserError if the URI is invalid.
+    The address is the URI of a ROS master, by default ROS_MASTER_URI. Raise UserError if it is invalid.
     """
     uri = master_uri(options.address)
     return RosRobot("ros1", uri, "ros1_worker.py", options, {"ROS_MASTER_URI": uri}, waits=waits)
 
 
 def ros2(options: Options, waits: Timeouts | None = None) -> RosRobot:
-    """Create a robot on ROS 2, whose worker runs rclpy under the system's Python or CodeBotler's own.
+    """Create a robot on ROS 2. Its worker process uses rclpy, under the robot's or CodeBotler's Python.
 
-    Its address is a domain number, by default ROS_DOMAIN_ID or else 0. Raise UserError if it is no number.
+    The address is a domain number, by default ROS_DOMAIN_ID or 0. Raise UserError if it is not a number.
     """
     domain = domain_of(options.address)
     options = replace(options, ros_python=choose_python(options.ros_python))
@@ -70,7 +70,7 @@ def master_uri(address: str = "") -> str:
 
 
 def domain_of(address: str = "") -> str:
-    """Return the ROS 2 domain: `address`, ROS_DOMAIN_ID or else 0. Raise UserError if it is no number."""
+    """Return the ROS 2 domain: `address`, ROS_DOMAIN_ID or else 0. Raise UserError if it is not a number."""
     domain = address or os.environ.get("ROS_DOMAIN_ID") or "0"
     if not domain.isdecimal():
         raise UserError(f'"{domain}" is not a ROS_DOMAIN_ID; write a number such as 0')
@@ -85,7 +85,7 @@ def choose_python(named: Path = ROS_PYTHON) -> Path:
 
 
 def ros_readiness(name: str, python: Path = ROS_PYTHON) -> Readiness:
-    """Check whether `python` can run the worker for `name` (ros1 or ros2), without the message types."""
+    """Check whether `python` can run the worker for `name` (ros1 or ros2). Ignore the message types."""
     if name == "ros1":
         needs: Sequence[str] = ROS1_MODULES
         mend, see = INSTALL_ROS1, "needs a master, see ROS_MASTER_URI"
@@ -100,6 +100,6 @@ def ros_readiness(name: str, python: Path = ROS_PYTHON) -> Readiness:
 
 
 def find_fix(installed: Path = Path("/opt/ros")) -> str:
-    """Return the command that makes ROS 2 available: sourcing an installed ROS 2, or else installing it."""
+    """Return the command that makes ROS 2 available: source an installed version, or else install one."""
     setups = sorted(path for path in installed.glob("*/setup.bash") if (path.parent / "share/rclpy").is_dir())
     return f"source {setups[-1]}" if setups else INSTALL_ROS2

@@ -95,7 +95,7 @@ class RosRobot(RosCaller):
 
     @property
     def failed_stop(self) -> str:
-        """A warning if the robot still moves a few seconds after a stop, or "" if no report shows that."""
+        """A warning if the robot is still moving seconds after a stop, or "" if no report shows that."""
         worker, until = self._worker, time.monotonic() + self._waits.patience * 0.8
         if worker is None or not (self.connection.pose or self.connection.velocity):
             return ""

@@ -38,7 +38,7 @@ class RosWorker:
 
     It runs in its own session so that Ctrl-C does not end it before it has stopped the robot. If heartbeats
     from this process stop, the worker cancels the goal, since a suspended process cannot react to Ctrl-C.
-    `about` is the worker's message that it is ready, and `motion` the robot's motion.
+    `about` is the worker's message that it is ready, and `motion` tracks the robot's motion.
 
     Args:
         python: the Python interpreter that runs the script.
@@ -188,7 +188,7 @@ def executable(python: Path) -> str:
 
 
 def outer_environment() -> dict[str, str]:
-    """Return the environment variables, without the changes that a ROS installed by pip has made."""
+    """Return the environment variables without the changes made by a ROS that pip installed."""
     environment = dict(os.environ)
     if environment.pop(WHEELS_MARK, None) is not None:
         folders = environment.get("LD_LIBRARY_PATH", "").split(os.pathsep)
@@ -198,7 +198,7 @@ def outer_environment() -> dict[str, str]:
 
 
 def find_missing(python: Path, modules: Sequence[str]) -> list[str] | None:
-    """Return those modules that an interpreter lacks, or None if the interpreter cannot be run."""
+    """Return the modules that an interpreter lacks, or None if the interpreter cannot be run."""
     code = "import sys, importlib.util as u; print(*(m for m in sys.argv[1:] if u.find_spec(m) is None))"
     try:
         done = subprocess.run(  # noqa: S603 - the interpreter that the user names

@@ -48,7 +48,7 @@ class KeepoutForm(_ConnectionPart):
 
 
 class SkillForm(_ConnectionPart):
-    """The entry of one skill: an action, service or topic, or else a camera and a detector."""
+    """The entry of a skill in a connection file: an action, service or topic, or a camera and a detector."""
 
     action: Topic | None = None
     service: Topic | None = None
@@ -139,7 +139,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
                 other,
             )
     if skill.returns.annotation != "None" and not form.result:
-        raise file.wrong(f'add "result", the field of the answer that {skill.signature} returns', *at)
+        raise file.wrong(f'in "result", name the field of the answer that {skill.signature} returns', *at)
     request = getattr(form, MESSAGE_KEYS[kind])
     known = {parameter.name for parameter in skill.parameters}
     known |= {*PLACE_VARIABLES} if places and skill.is_drive else set()

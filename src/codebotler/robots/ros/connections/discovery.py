@@ -72,7 +72,7 @@ def discover_offers(address: str, python: Path) -> list[str]:
 
 
 def draft_connection(offers: Iterable[str]) -> str:
-    """Draft a `--connect` file from the texts of `discover_offers`. Comments show what to complete."""
+    """Draft a `--connect` file from the result of `discover_offers`. Comments say what to complete."""
     valid = filter(re.compile(r"\w+ [\w/]+ [\w/]+").fullmatch, sorted(offers))
     known = [offer for offer in valid if not INTERNAL_OFFERS.fullmatch(offer)]
     rest = {offer.partition(" ")[2] for offer in known}

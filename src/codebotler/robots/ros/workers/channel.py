@@ -23,7 +23,7 @@ class SetupError(Exception):
 
 
 class Channel:
-    """Exchanges lines of JSON with CodeBotler on standard input and output. Prints go to standard error."""
+    """Exchanges JSON lines with CodeBotler on standard input and output. `print` writes to standard error."""
 
     def __init__(self) -> None:
         self._out = os.fdopen(os.dup(1), "w", encoding="utf-8")
@@ -40,7 +40,7 @@ class Channel:
         self._lines.put(json.dumps({"is": kind, **more}, default=str) + "\n")
 
     def finish(self) -> None:
-        """Wait until all queued messages are written, but at most 1 second."""
+        """Wait up to 1 second for all queued messages to be written."""
         self._lines.put(None)
         self._writer.join(WRITE_SECONDS)
 

@@ -26,7 +26,7 @@ ROS2_ENDS = {4: "succeeded", 5: "cancelled", 6: "aborted"}
 
 
 class Goal:
-    """A request to a server to perform a skill, and its progress. All times are of the monotonic clock."""
+    """A request to a server to perform a skill, and its progress. All times are on the monotonic clock."""
 
     def __init__(self, number: int, server: Any) -> None:
         self.number, self.server = number, server
@@ -163,7 +163,7 @@ class SkillWorker:
         self.graph.leave()
 
     def stop(self) -> None:
-        """Cancel the current goal, and wait up to 1 second for its end."""
+        """Cancel the current goal, and wait up to 1 second for it to end."""
         goal = self.goal
         if goal is not None and not goal.is_over:
             goal.cancel()
@@ -181,7 +181,7 @@ class SkillWorker:
         }
 
     def wait_for_servers(self) -> None:
-        """Wait until all servers on the graph are connected, but at most `patience` seconds."""
+        """Wait up to `patience` seconds for all servers on the graph to be connected."""
         deadline = time.monotonic() + self.patience
         present = [server for server in self.servers.values() if self.graph.nodes_of(server.name)]
         # Ask all servers in each round, because a server's first call starts the timer for its connection.
@@ -198,13 +198,13 @@ class SkillWorker:
         return True
 
     def check_goal(self, goal: Goal, sent: float, now: float) -> None:
-        """End a goal, sent at time `sent`, as lost if its server has died or is too slow at time `now`."""
+        """End a goal that was sent at time `sent` as lost if its server has died or is too slow by `now`."""
         fault = self._find_fault(goal, sent, now)
         if fault is not None:
             self.end(goal, "lost", text=fault)
 
     def end(self, goal: Goal, kind: str, **more: Any) -> None:
-        """Report the end of a goal with a message of `kind`, such as `result`. Ignore any later end."""
+        """Report the end of a goal with a message of `kind`, such as `result`. Later calls do nothing."""
         with goal.lock:
             if goal.is_over:
                 return
@@ -242,7 +242,7 @@ class SkillWorker:
             threading.Thread(target=self._end_with_picture, args=(goal, values), daemon=True).start()
 
     def pass_picture(self, server: Any, data: str) -> None:
-        """Pass on a picture in base64 if it comes from the server of the current goal."""
+        """Send a picture in base64 to CodeBotler if it comes from the current goal's server."""
         goal = self.goal
         if goal is None or goal.server is not server or goal.sent is None or goal.is_over:
             return

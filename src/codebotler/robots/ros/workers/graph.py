@@ -15,7 +15,7 @@ MASTER_SECONDS, NODE_SECONDS = 5.0, 2.0  # the time limits for answers from the 
 
 
 class Ros1Graph:
-    """Our node on ROS 1, whose unique name reserves the robot. It also asks the master about others."""
+    """Our node on ROS 1, whose unique name reserves the robot. Also asks the master about other nodes."""
 
     def __init__(self, name: str) -> None:
         import netifaces  # noqa: F401 - if it is missing, fail here rather than later in a thread of rosgraph
@@ -43,7 +43,7 @@ class Ros1Graph:
         return address is not None
 
     def leave(self) -> None:
-        """Unregister our node at the master."""
+        """Unregister our node from the master."""
         import rospy
 
         rospy.signal_shutdown("the end")

@@ -68,7 +68,7 @@ def split_type(type_name: str) -> tuple[str, str]:
 
 
 def provider_word(type_name: str) -> str:
-    """Return the word for the provider of a type, such as `service` for std_srvs/srv/Trigger."""
+    """Return `action server`, `service` or `subscriber`, whichever a node offers with this type."""
     return OFFER_NAMES[type_name.split("/")[1]]
 
 

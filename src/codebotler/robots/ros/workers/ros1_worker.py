@@ -64,7 +64,7 @@ class Ros1Server(Server):
     def cancel(self, goal_id: str = "") -> None:
         """Cancel one goal, or all goals of all clients if `goal_id` is empty.
 
-        The `cancel` method of actionlib would report a goal as lost if it has not reached the server yet.
+        This replaces actionlib's own `cancel`, which reports a goal that has not reached the server as lost.
         """
         import actionlib_msgs.msg
 
@@ -88,7 +88,7 @@ class Ros1Service(Server):
         self.client = rospy.ServiceProxy(self.name, spec)
 
     def is_connected(self, _silence: float) -> bool:
-        """Return whether the service is registered at the master."""
+        """Return whether the service is registered with the master."""
         return bool(self.graph.nodes_of(self.name))
 
     def perform(self, message: Any) -> Fields:
@@ -98,7 +98,7 @@ class Ros1Service(Server):
 
 
 class Ros1Topic(Server):
-    """A publisher for a topic whose messages make the robot perform a skill, without a confirmation."""
+    """Publishes messages that make the robot perform a skill. The robot confirms nothing."""
 
     def __init__(self, _worker: Ros1Worker, call: Fields) -> None:
         import rospy
@@ -137,7 +137,7 @@ ROS1_SERVERS = {"action": Ros1Server, "service": Ros1Service, "topic": Ros1Topic
 
 
 class Ros1Worker(SkillWorker):
-    """Performs skills over ROS 1."""
+    """Performs skills on a ROS 1 robot through actions, services and topics."""
 
     graph: Ros1Graph
 
@@ -163,7 +163,7 @@ class Ros1Worker(SkillWorker):
         return unsubscribe
 
     def send(self, goal: Goal, fields: Fields) -> None:
-        """Send a goal, or end it with a message if its fields do not fit its type."""
+        """Send a goal, or end it as unsent if its fields do not fit its type."""
         import genpy
 
         try:  # serialize here first, because an error in rospy would leave half a message in the stream

@@ -38,8 +38,8 @@ class Ros2Graph:
     def enter(self, *, is_rescue: bool = False) -> bool:
         """Start our node. Return whether a dead node had its name. Raise SetupError if a live one has.
 
-        If workers on two machines start at the same time, both notice this and stop. With `is_rescue`, do not
-        look, but return True: CodeBotler has just killed the last worker.
+        If workers on two machines start at the same time, both notice this and stop. With `is_rescue`, skip
+        the search and return True, because CodeBotler has just killed the last worker.
         """
         self._lock = self._take_lock()
         self._is_left_behind = is_rescue or self._has_dead_twin()
@@ -68,7 +68,7 @@ class Ros2Graph:
         self._spinning.start()
 
     def leave(self) -> None:
-        """Destroy our node. If we only shut down, other nodes would still see it until its lease expires."""
+        """Destroy our node. After a shutdown alone, other nodes would see it until its lease expires."""
         self._rclpy.shutdown()
         self._spinning.join(ROS2_EXIT_SECONDS)
         for action in list(self.ours.waitables):

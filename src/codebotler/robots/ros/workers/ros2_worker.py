@@ -60,7 +60,7 @@ class Ros2Server(Server):
         self.has_cancelled = False
 
     def last_alive(self) -> float:
-        """Return the current monotonic time if the server is on the graph (DDS removes it late), else 0."""
+        """Return the monotonic time if the server is on the graph, else 0. DDS drops dead servers late."""
         return time.monotonic() if self.client.server_is_ready() else 0.0
 
     def is_connected(self, _silence: float) -> bool:
@@ -72,7 +72,7 @@ class Ros2Server(Server):
         return bool(self._graph.ours.count_publishers(f"{self.name}/picture"))
 
     def cancel(self) -> None:
-        """Request the cancellation of all goals of all clients. The answer sets `has_cancelled`."""
+        """Request the cancellation of all goals of all clients. The server's answer sets `has_cancelled`."""
         self._graph.call_soon(lambda: self.request_cancel(ALL_GOALS).add_done_callback(self._confirm))
 
     def _confirm(self, done: Any) -> None:
@@ -105,7 +105,7 @@ class Ros2Service(Server):
 
 
 class Ros2Topic(Server):
-    """A publisher for a topic whose messages make the robot perform a skill, without a confirmation."""
+    """Publishes messages that make the robot perform a skill. The robot confirms nothing."""
 
     def __init__(self, worker: Ros2Worker, call: Fields, spec: Any) -> None:
         super().__init__(call)
@@ -126,7 +126,7 @@ ROS2_SERVERS = {"action": Ros2Server, "service": Ros2Service, "topic": Ros2Topic
 
 
 class Ros2Worker(SkillWorker):
-    """Performs skills over ROS 2."""
+    """Performs skills on a ROS 2 robot through actions, services and topics."""
 
     graph: Ros2Graph
     silence_says = "the server has left the graph; DDS reports a killed process late, by default after 20 s"
@@ -213,7 +213,7 @@ class Ros2Worker(SkillWorker):
         self.channel.send("progress", text=text)
 
     def check_goal(self, goal: Goal, sent: float, now: float) -> None:
-        """Check a goal's time limits, and repeat a cancel or a request for a result that had no effect."""
+        """Check a goal's time limits. Repeat a cancel or a request for the result if it had no effect."""
         super().check_goal(goal, sent, now)
         handle, cancelled, ended = goal.handle, goal.cancelled, goal.status_ended
         if goal.is_over or handle is None:  # calls of services and topics have no handle

@@ -34,7 +34,7 @@ RECALLED = 7
 
 @dataclass(frozen=True)
 class GoalUpdate:
-    """A goal's new status, feedback or end. An empty `goal` means only that the server is alive."""
+    """A goal's new status, feedback or end. With an empty `goal`, it only shows that the server is alive."""
 
     goal: str  # the goal id, or an empty string
     what: str  # status (which implies that the server has accepted the goal), feedback or ended
@@ -137,7 +137,7 @@ ActionProtocol: TypeAlias = Ros1Protocol | Ros2Protocol
 
 
 class RosbridgeConnection:
-    """A rosbridge connection. Its thread passes goal updates to `hear`, and calls `lost` if it breaks."""
+    """A rosbridge connection. Its thread calls `hear` for each goal update and `lost` if the link breaks."""
 
     def __init__(
         self,

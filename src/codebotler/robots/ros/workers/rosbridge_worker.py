@@ -53,7 +53,7 @@ class RosbridgeServer(Server):
 
 
 class RosbridgeWorker(SkillWorker):
-    """Performs skills over a rosbridge."""
+    """Performs skills on a robot behind a rosbridge server, over a websocket."""
 
     graph: RosbridgeConnection
     settles = SETTLE_SECONDS
@@ -75,7 +75,7 @@ class RosbridgeWorker(SkillWorker):
     def listen(
         self, topic: str, hear: Callable[[Fields], object], *, is_needed: bool = True
     ) -> Callable[[], object]:
-        """Subscribe to a topic as in `SkillWorker.listen`, but never notice that it has no publisher."""
+        """Subscribe to a topic, as `SkillWorker.listen` describes, even if nothing publishes it."""
         del is_needed
         return self.graph.listen(topic, hear)
 

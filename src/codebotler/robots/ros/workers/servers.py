@@ -13,7 +13,7 @@ from message_types import action_types
 
 
 class ActionServers:
-    """Offers an action server for each skill, and starts a master if none answers.
+    """Offers a ROS 1 action server for each skill, and starts a ROS master if none answers.
 
     The first message contains the `node` name, the `actions` by skill, and the `port` for a master, or null.
     """
