@@ -50,7 +50,7 @@ Condition: TypeAlias = Callable[[Context], bool]
 
 @dataclass(frozen=True)
 class Operator:
-    """A mutation operator: it puts one kind of mistake into programs, such as a missing drive."""
+    """A mutation operator, which introduces one kind of mistake into programs, such as a missing drive."""
 
     name: str  # such as `drop-the-return`
     about: str
@@ -66,7 +66,7 @@ def operators_in(module: ModuleType) -> Iterator[Operator]:
 
 
 def only_if(condition: Condition) -> Callable[[Mutate], Mutate]:
-    """Return a decorator for an operator. It yields no edits for a task that does not meet the condition."""
+    """Return a decorator that makes an operator yield no edits for tasks that do not meet a condition."""
 
     def conditional(edits: Mutate) -> Mutate:
         @wraps(edits)

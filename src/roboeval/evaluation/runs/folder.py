@@ -74,7 +74,7 @@ class RunFolder:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Lock this run so that no other process can write to it. Raise UserError if one already does."""
+        """Lock this run so that no other process can write to it. Raise UserError if one does already."""
         self._expect_no_others()
         made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         lock = self.path / ".lock"
@@ -198,7 +198,7 @@ def evaluation_key(suite: Suite, *, ablated: bool) -> str:
 def tasks_to_judge(
     suite: Suite, names: str | None, *, ablated: bool
 ) -> tuple[frozenset[str] | None, tuple[str, ...]]:
-    """Parse task names such as `A, B`. Return those to judge (None: all) and those without an ablation."""
+    """Parse task names such as `A, B`. Return tasks to judge (None: all) and tasks without an ablation."""
     wanted = [*suite.tasks] if names is None else [suite.task(name.strip()).name for name in names.split(",")]
     if not ablated:
         return (None if names is None else frozenset(wanted)), ()

@@ -88,7 +88,7 @@ class JudgingScope:
 
     @property
     def missions_sentence(self) -> str | None:
-        """A sentence about the turns and endings of an agent's missions, or None if there are no missions."""
+        """A sentence about the turns and endings of agent missions, or None if there are no missions."""
         if not (count := sum(self.endings.values())):
             return None
         ended = ", ".join(f"{ending} {number:,}" for ending, number in Counter(self.endings).most_common())
