@@ -52,7 +52,7 @@ def parse_selection(text: str, suite: Suite) -> Selection:
 
 
 def expect_judged(selection: Selection, judged: Iterable[CompletionKey]) -> None:
-    """Raise UserError if none of the `judged` completions is in the selected part of the run."""
+    """Raise UserError if the selection contains none of the `judged` completions."""
     if not any(key[: len(selection)] == selection for key in judged):
         part = "/".join(map(str, selection))
         raise UserError(f"no completion of {part} is judged in this run; `roboeval show RUN` lists its tasks")

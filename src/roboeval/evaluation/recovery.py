@@ -101,7 +101,7 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
 def find_first_right(
     worker: Worker, suite: Suite, completions: Iterable[Completion]
 ) -> Iterator[list[Interruption | FaultResult]]:
-    """Yield `find_interruptions` of each completion, but [] once a right program of the task was found."""
+    """Yield `find_interruptions` of each completion, but [] once a right program of its task is found."""
     done: set[str] = set()
     for one in completions:
         found = [] if one.task in done else find_interruptions(worker, suite, one)

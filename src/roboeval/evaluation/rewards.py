@@ -77,7 +77,7 @@ def reward(
 class Share:
     """The two factors of a program's reward in a world, `gained` and `kept`, which are shares from 0 to 1.
 
-    `gained` is for requirements not met at the start, or None if all were met; `kept` is for the others.
+    `gained` covers the requirements not met at the start (None: all were met), and `kept` the others.
     """
 
     gained: float | None  # satisfied share of the requirements not met at the start, or None

@@ -95,7 +95,7 @@ class JudgedRun:
 
     @cached_property
     def checked(self) -> tuple[CheckedPrompt, ...]:
-        """By prompt, how many programs the check accepts and how many pass. Empty if any is unchecked."""
+        """The numbers of accepted and passing programs of each prompt. Empty if any is unchecked."""
         return () if self.table["accepted"].null_count() else count_by_prompt(self.table)
 
 
@@ -151,7 +151,7 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
 
 
 def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
-    """Name each run by its label, else its model or folder. Add the folder or a number to equal names."""
+    """Name each run by its label, or else its model or folder. Add the folder or a number to duplicates."""
     given = [labels.get(at) or run.model or run.folder for at, run in enumerate(runs)]
     plain = [short_name(name, MAX_RUN_NAME) for name in given]
     with_folder = [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)]

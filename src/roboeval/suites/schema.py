@@ -134,7 +134,7 @@ class SampledThingFile(StrictForm):
 
 
 class CornerFile(StrictForm):
-    """A world of a sampled task with some values set by hand. The rest take the first in their lists."""
+    """A world of a sampled task with some values set by hand. The rest use the first of their lists."""
 
     about: Name
     set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}

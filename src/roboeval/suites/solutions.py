@@ -52,7 +52,7 @@ def locate_solution(task: Task, solution: Solution) -> tuple[Path, int | None]:
 
 
 def equivalent_mutants(task: Task) -> Mapping[tuple[str, str], str]:
-    """Return the task's known harmless mutants: (operator, `bare_diff`) and the reason why each is right."""
+    """Map a task's known equivalent mutants, as (operator, `bare_diff`), to the reason why each is right."""
     listed = _read(task.path.parents[1], task).equivalent_mutants
     return {(one.operator, bare_diff(one.diff)): one.because.strip() for one in listed}
 

@@ -43,7 +43,7 @@ class RunStore:
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """Return a run's latest snapshot. `key` names an evaluation; by default, avoid ablations."""
+        """Return a run's latest snapshot. `key` names an evaluation; by default, ablations are avoided."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
@@ -56,7 +56,7 @@ class RunStore:
         try:
             if _stamp(path, self.folder.resolve()) is not None:
                 if (size := path.stat().st_size) > MAX_REPORT_BYTES:
-                    raise UserError(f"the file has {size:,} bytes, too many; open it on disk", file=path.name)
+                    raise UserError(f"the file is too big ({size:,} bytes); open it on disk", file=path.name)
                 return path.read_bytes()
         except OSError:
             pass

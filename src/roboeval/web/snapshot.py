@@ -141,7 +141,7 @@ class Snapshot:
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
     def prompts(self, chosen: CompletionFilter) -> list[dict[str, Any]]:
-        """Count each prompt's completions: `written`, `judged`, and `counted`, which the filter selects.
+        """Count each prompt's completions: `written`, `judged`, and `counted` (selected by the filter).
 
         The filter's task and prompt are ignored. `share` is counted / judged, or None if none is judged.
         """

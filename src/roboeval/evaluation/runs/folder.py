@@ -74,7 +74,7 @@ class RunFolder:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Lock this run so that no other process can write to it. Raise UserError if one does already."""
+        """Lock this run so that no other process can write to it. Raise UserError if one already does."""
         self._expect_no_others()
         made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         lock = self.path / ".lock"

@@ -190,7 +190,7 @@ def take_judged(left: dict[CompletionKey, Completion], line: LocatedRow, file: P
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
-    """Yield (task, hash) of each checked program, and its problems as sentences, empty if it was accepted."""
+    """Yield (task, hash) of each checked program, and its problems as sentences ([] if it was accepted)."""
     for number, row in read_rows(path):
         match row:
             case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
@@ -200,7 +200,7 @@ def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
 
 
 class Seal:
-    """Counts and hashes the rows of an evaluation. KEY.json stores the result, to reveal later changes."""
+    """Counts and hashes the rows of an evaluation. KEY.json stores the result, to detect later changes."""
 
     def __init__(self) -> None:
         self._count, self._hash = 0, hashlib.sha256()

@@ -82,7 +82,7 @@ class FamilyTasks:
 
 
 def family_tasks_named(name: str) -> FamilyTasks | None:
-    """Parse a name such as `families-test-7`, or return None. Raise UserError if a part of it is invalid."""
+    """Parse a name such as `families-test-7`, or return None for other names. Raise UserError if invalid."""
     match = FAMILY_SUITE_NAME.fullmatch(name)
     if match is None:
         return None
