@@ -35,7 +35,7 @@ def recover(
     json: JsonOption = False,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
-    """Make skill calls fail, and judge how a model continues the missions.
+    """Make skill calls fail, and judge how a model continues.
 
     For each task, the first right program runs several times in each world. Each time, another call fails.
     """
