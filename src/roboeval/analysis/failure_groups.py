@@ -63,7 +63,7 @@ class FailureGroup:
 
     @property
     def prompts(self) -> list[int]:
-        """The numbers of the prompts that the completions answer, in ascending order."""
+        """The numbers of the prompts of these completions, in ascending order."""
         return sorted({prompt for _, prompt, _ in self.members})
 
 
@@ -195,7 +195,7 @@ def similarity(one: Counter[str], other: Counter[str]) -> float:
 
 
 def passing_programs(named: Iterable[tuple[str, str]]) -> dict[ProgramLines, str]:
-    """Return the names of programs by their lines, given (name, program) pairs. Of equals, keep the first."""
+    """Map each program's lines to its name, given (name, program) pairs. The first of equal programs wins."""
     first: dict[ProgramLines, str] = {}
     for name, program in named:
         first.setdefault(_split(program), name)

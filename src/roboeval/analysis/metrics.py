@@ -59,7 +59,7 @@ class Estimate:
 
     @property
     def is_known(self) -> bool:
-        """Whether the interval is informative, which requires at least two different values."""
+        """Whether the interval says anything: False if the values do not vary or are too few."""
         return self.high - self.low > ROUNDING_ERROR and (self.low, self.high) not in (SHARE, DIFFERENCE)
 
     def ends(self, form: str = ".3f") -> str:
@@ -136,7 +136,7 @@ def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
 
 
 def over_tasks(values: Iterable[tuple[str, float]], *, within: tuple[float, float] = SHARE) -> Estimate:
-    """Return the mean of (task, value) pairs, with its 95% interval over tasks, which is cut to `within`."""
+    """Return the mean of (task, value) pairs, with its 95% interval over tasks, clipped to `within`."""
     by_task: dict[str, list[float]] = {}
     for task, value in values:
         by_task.setdefault(task, []).append(value)
@@ -164,7 +164,7 @@ def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
 def by_formula(
     clusters: Clusters, *, within: tuple[float, float] = SHARE, over: SamplingUnit = "prompts"
 ) -> Estimate:
-    """Return the mean of all values with its cluster-robust 95% interval, which is cut to `within`.
+    """Return the mean of all values with its cluster-robust 95% interval, clipped to `within`.
 
     The variance of the mean is G / (G - 1) * sum over clusters of (sum of (value - mean))**2 / N**2, for G
     clusters with N values. The interval uses Student's t with G - 1 degrees of freedom. With one value per

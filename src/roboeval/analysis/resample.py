@@ -90,7 +90,7 @@ def count_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
 
 @dataclass(frozen=True)
 class RetryResult:
-    """The result of rejection sampling over all prompts if each may have at most `retries` retries."""
+    """The result of rejection sampling over all prompts, with at most `retries` retries per program."""
 
     retries: int
     passed: Estimate  # pass@1
@@ -101,7 +101,7 @@ class RetryResult:
 
 
 def resample(prompts: Sequence[CheckedPrompt], retries: int) -> RetryResult:
-    """Compute the result of rejection sampling with at most `retries` retries for each program."""
+    """Compute the result of rejection sampling with at most `retries` retries per program."""
     each = tuple(final_chances(prompt, retries) for prompt in prompts)
     return RetryResult(
         retries=retries,

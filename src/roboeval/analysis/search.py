@@ -14,7 +14,7 @@ from roboeval.evaluation.runs.traces import trace_of
 
 @dataclass(frozen=True)
 class TraceQuery:
-    """A search for traces by task, world and formula (None: any), or, if `negated`, by violated formula."""
+    """A search for traces by task, world and formula. If `negated`, traces must violate the formula."""
 
     formula: Formula | None = None  # None matches every trace
     negated: bool = False  # whether to find traces that do not satisfy the formula

@@ -79,7 +79,7 @@ def p_by_signs(clusters: Clusters, *, seed: int = BOOTSTRAP_SEED, draws: int = 1
 
 @dataclass(frozen=True)
 class SampleSizes:
-    """The numbers of completions per prompt, or of prompts, that detect a difference (80% power), or None."""
+    """The numbers of completions per prompt and of prompts that give 80% power, or None if unknown."""
 
     completions: int | None  # number per prompt and model, if only these prompts matter
     prompts: int | None  # number of similar prompts, with as many completions per prompt as now

@@ -52,7 +52,7 @@ def parse_selection(text: str, suite: Suite) -> Selection:
 
 
 def expect_judged(selection: Selection, judged: Iterable[CompletionKey]) -> None:
-    """Raise UserError if none of the `judged` completions is in the selected part of the run."""
+    """Raise UserError if the selection contains none of the `judged` completions."""
     if not any(key[: len(selection)] == selection for key in judged):
         part = "/".join(map(str, selection))
         raise UserError(f"no completion of {part} is judged in this run; `roboeval show RUN` lists its tasks")
@@ -96,7 +96,7 @@ def open_run(
 ) -> Results:
     """Read a judged run. If a completion such as `LunchTime/0/12` is given, read only the rows of its task.
 
-    `ablated` selects the verdicts on common sense only. Completions are taken from `reuse_from` if possible.
+    `ablated` selects the common-sense-only verdicts. If given, `reuse_from` provides the completions.
     """
     from roboeval.evaluation.runs.folder import evaluation_of
     from roboeval.evaluation.runs.results import read_results
@@ -125,7 +125,7 @@ def open_run(
 def open_with_results(
     run: Path, suite_name: str, *, ablated: bool, rules: Path | None = None, reuse_from: Results | None = None
 ) -> Results:
-    """Read a run with `open_run`. Print a note if only a part is judged. Raise UserError if nothing is."""
+    """Read a run with `open_run`. Print a note if it is only partly judged. Raise UserError if nothing is."""
     results = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from)
     unjudged = unjudged_sentence(results, suite_name, rules)
     if results.table.is_empty():
@@ -136,7 +136,7 @@ def open_with_results(
 
 
 def unjudged_sentence(results: Results, suite_name: str, rules: Path | None) -> str | None:
-    """Return a sentence on how many completions are judged and how to judge the others. None if all are."""
+    """Return how many completions are judged and how to judge the rest, or None if all are judged."""
     from roboeval.evaluation.runs.completions import how_many
 
     count, total = len(results.places), results.scope.total

@@ -12,7 +12,7 @@ from roboeval.cli.output import fail
 
 
 def path_to(what: str) -> Callable[[str], Path]:
-    """Return a path parser that rejects an empty string and asks for `what` instead, such as `a run`."""
+    """Return a parser for paths. For an empty string, its error message asks for `what`, such as `a run`."""
 
     def path(text: str) -> Path:
         return Path(text) if text else fail(f"the argument is empty; name {what}")

@@ -26,7 +26,7 @@ Watched = TypeVar("Watched")
 
 
 def show_progress(items: Iterable[Watched], doing: str, total: int) -> Iterator[Watched]:
-    """Yield the items, and show progress such as `reading: 12 of 80` (as a bar if there is a terminal)."""
+    """Yield the items, and show progress such as `reading: 12 of 80` (or a bar in a terminal)."""
     with progress_meter(doing, total) as update:
         for done, item in enumerate(items, 1):
             yield item
@@ -35,7 +35,7 @@ def show_progress(items: Iterable[Watched], doing: str, total: int) -> Iterator[
 
 @contextmanager
 def progress_meter(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, str], None]]:
-    """Show progress from `before` to `total`. Yield a function to call with the number done and a remark."""
+    """Show progress from `before` to `total`. Yield a function that takes the number done and a remark."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     more_column = TextColumn("{task.fields[more]}", markup=False)

@@ -60,7 +60,7 @@ def show(suite: Suite, task: str | None) -> None:
 
 
 def start(task: str, suite: str) -> None:
-    """Create an example task with the name `task` in the folder of a suite, to be edited."""
+    """Create an example task named `task` in a suite's folder, for the user to edit."""
     from roboeval.suites.load import known_suites
     from roboeval.suites.new_task import new_task
 
@@ -72,7 +72,7 @@ def start(task: str, suite: str) -> None:
 
 
 def lint_tasks(suite: Suite, tasks: Sequence[Task], *, accepted: bool) -> None:
-    """Print the linter's findings, also accepted ones if `accepted`. Exit with status 1 if others exist."""
+    """Print the linter's findings, with accepted ones if `accepted`. Exit with status 1 if others exist."""
     from codebotler.simulator.pool import cores
     from roboeval.linting.findings import render
     from roboeval.linting.lint import lint

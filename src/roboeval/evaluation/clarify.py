@@ -36,7 +36,7 @@ class ClarifySettings:
     """The settings of `clarify`, which lets a simulated person choose among programs.
 
     Args:
-        candidates: the number of a prompt's programs among which one question decides, at least 2.
+        candidates: the number of programs to choose from with one question, at least 2.
         noise: the share of questions that the simulated person answers wrongly.
         seed: the random seed for the choice of the programs and for the answers.
     """
@@ -49,8 +49,8 @@ class ClarifySettings:
 class ClarifyShares(TypedDict):
     """Pass rates from 0 to 1 without a clarifying question (`one`, `majority`) and with it (`question`).
 
-    `mattered` is the share of questions whose answer changes the verdict from that on `majority`, a program
-    with the most frequent behaviour. It is None if no question was asked.
+    `majority` takes a program with the most frequent behaviour. `mattered` is the share of questions whose
+    answer leads to a different verdict than `majority`, or None if no question was asked.
     """
 
     one: float  # the share of single candidates that pass
@@ -62,7 +62,7 @@ class ClarifyShares(TypedDict):
 
 
 class PromptShares(ClarifyShares):
-    """The `ClarifyShares` of one prompt, which is identified by its task and its index in the task."""
+    """The `ClarifyShares` of one prompt, identified by its task and its index in the task."""
 
     task: str
     prompt: int
@@ -125,7 +125,7 @@ def _by_prompt(completions: Iterable[Completion], least: int) -> dict[tuple[str,
     if not (enough := {key: some for key, some in sorted(found.items()) if len(some) >= least}):
         most = max(map(len, found.values()), default=0)
         raise UserError(
-            f"a group needs {least} completions, but no prompt has more than {most}; lower --candidates"
+            f"each question needs {least} completions, but no prompt has more than {most}; lower --candidates"
         )
     return enough
 

@@ -87,7 +87,7 @@ def _is_in(task: str, tasks: frozenset[str] | None) -> bool:
 def evaluation_metadata(
     suite: Suite, *, ablated: bool = False, tasks: frozenset[str] | None = None
 ) -> dict[str, Any]:
-    """Return the content of KEY.json: the suite, the versions that judge, and the `tasks` (None: all)."""
+    """Return the content of KEY.json: the suite, the tool and Python versions, and `tasks` (None: all)."""
     house = suite.house
     return {
         "suite": suite.name,
@@ -106,7 +106,7 @@ def evaluation_metadata(
 
 
 def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[str, Any] | None:
-    """Return the content of KEY.json, or None without it. Raise UserError if suite or versions differ."""
+    """Return the content of KEY.json, or None if absent. Raise UserError if suite or versions differ."""
     key = evaluation_key(suite, ablated=ablated)
     path, rows = run.manifest(key), run.rows(key)
     if not path.exists():

@@ -44,9 +44,9 @@ class RecordingRobot(SimulatedRobot):
     Args:
         world: the world.
         suite: the suite with the settings, skills and house rules.
-        earlier_calls: the calls that it repeats at the start. A call of `SLEEP` lets time pass.
-        contracts: limits on its calls; a call outside of them ends the run.
-        fault: the index, from 0 and including earlier calls, of the one skill call that fails, or None.
+        earlier_calls: calls to repeat first. A call of `SLEEP` lets time pass.
+        contracts: limits on its calls; a call that violates one ends the run.
+        fault: the index of the skill call to make fail, counted from 0 with the earlier calls, or None.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class RecordingRobot(SimulatedRobot):
 
     @property
     def skill_calls(self) -> int:
-        """The number of skill calls that were made so far, without pauses."""
+        """The number of skill calls so far, not counting pauses."""
         return sum(name != SLEEP for name, _ in self.calls)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:

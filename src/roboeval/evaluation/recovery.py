@@ -32,7 +32,7 @@ from roboeval.suites.load import Scenario, Suite
 
 @dataclass(frozen=True)
 class FaultResult:
-    """The result of a mission in which one skill call was made to fail: how it ended, and its steps."""
+    """The result of a mission in which one skill call was made to fail: its end and its number of steps."""
 
     task: str
     world: int  # the index of its world
@@ -46,7 +46,7 @@ class FaultResult:
 
 @dataclass(frozen=True)
 class Interruption:
-    """A mission that a failed skill call ended, with what the prompt for the rest of the mission needs."""
+    """A mission that ended when a skill call failed, with the data needed to ask a model for the rest."""
 
     result: FaultResult  # which mission, and which fault
     scenario: Scenario = field(repr=False)  # its world, and what its prompt asks for
@@ -56,24 +56,24 @@ class Interruption:
 
     @property
     def room_map(self) -> RoomMap:
-        """The map of the rooms, with what the mission did and saw in them before it ended."""
+        """The room map, including what the mission did and saw before it ended."""
         return self.past.add_to(RoomMap.of(self.scenario.world), self.past.place)[0]
 
     def prompt(self, suite: Suite) -> Prompt:
-        """Return the prompt that asks a model to write a program for the rest of the mission."""
+        """Return the prompt that asks a model for a program for the rest of the mission."""
         rules, rooms = suite.house_sentences, self.room_map.described
         whole = prompt_for(self.past.instruction, rooms=rooms, rules=rules, skills=suite.skills)
         return rest_prompt(self.past, whole)
 
 
 def rest_prompt(past: MissionPast, request: Prompt) -> Prompt:
-    """Return the prompt for the rest of a mission. `request` is the prompt for the whole mission."""
+    """Return the prompt for the rest of a mission, given its past and the prompt for the whole mission."""
     last_step = (past.done or [""])[-1]
     return request.to_continue(past.program, past.steps, past.why, past.position_text(past.place), last_step)
 
 
 def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[Interruption | FaultResult]:
-    """Let each skill call of a program fail once in each world of its task, in a separate run.
+    """In each world of its task, run a program once for each of its skill calls, and make that call fail.
 
     Returns an Interruption for each run that ended with an error, and a FaultResult for each run in which the
     program handled the error itself. The list is empty if the program is wrong without any fault.
@@ -101,7 +101,7 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
 def find_first_right(
     worker: Worker, suite: Suite, completions: Iterable[Completion]
 ) -> Iterator[list[Interruption | FaultResult]]:
-    """Yield for each completion its `find_interruptions`, or [] after the first right program of its task."""
+    """Yield `find_interruptions` of each completion, but [] once a right program of its task is found."""
     done: set[str] = set()
     for one in completions:
         found = [] if one.task in done else find_interruptions(worker, suite, one)
@@ -117,7 +117,7 @@ def check_rest(worker: Worker, suite: Suite, program: str, room_map: RoomMap, be
 
 
 def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: str | None) -> FaultResult:
-    """Check and run a program for the rest of a mission (None: missing), and judge the whole mission."""
+    """Check and run a program for the rest of a mission, or None if missing, and judge the whole mission."""
     if program is None:
         return replace(one.result, end="missing")
     problems = check_rest(worker, suite, program, one.room_map, one.past.program).problems
@@ -144,7 +144,7 @@ def _effects(trace: Trace) -> Counter[str]:
 def write_continuations(
     model: Model, prompts: Sequence[Prompt], concurrency: int, update: Callable[[int, str], None]
 ) -> list[str | None]:
-    """Return a program for each prompt, or None if the model refuses it or has none recorded for it.
+    """Return a program for each prompt, or None if the model refuses or has no recorded program.
 
     At most `concurrency` requests run at a time. Equal prompts are sent once. `update` is called with the
     number of replies and an empty text. The model is closed at the end.
@@ -171,7 +171,7 @@ def write_continuations(
 
 
 def recovery_data(results: Sequence[FaultResult]) -> dict[str, int | float | None]:
-    """Return counts of missions, shares of the continued ones (None without any), and counts of steps."""
+    """Return counts of missions and steps, and shares of continued missions, or None if there are none."""
     ends = Counter(one.end for one in results)
     passed = [one for one in results if one.end == "passed"]
     continued = len(results) - ends["handled"] - ends["missing"]

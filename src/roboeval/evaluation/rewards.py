@@ -77,7 +77,7 @@ def reward(
 class Share:
     """The two factors of a program's reward in a world, `gained` and `kept`, which are shares from 0 to 1.
 
-    `gained` is about requirements not met at the start (None: all are met), `kept` about the others.
+    `gained` covers the requirements not met at the start (None: all were met), and `kept` the others.
     """
 
     gained: float | None  # satisfied share of the requirements not met at the start, or None
@@ -104,8 +104,8 @@ def requirements_of(suite: Suite, task: str, prompt: int) -> AskedWorlds:
 def total(shares: Sequence[Share]) -> float:
     """Compute a program's reward from its shares in all worlds of a task.
 
-    Where all requirements hold at the start, the reward is the mean of the other worlds, times the share of
-    requirements still met. If this is so in all worlds, a program that does nothing gets the full reward.
+    In a world where all requirements hold at the start, the reward is the mean of the other worlds times the
+    share still met. If all worlds are like this, a program that does nothing gets the full reward.
     """
     earned = [share.gained * share.kept for share in shares if share.gained is not None]
     elsewhere = fmean(earned) if earned else 1.0
@@ -135,7 +135,7 @@ class Components:
 
 
 def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bool = True) -> Components:
-    """Compute a program's components from its outcome in each world. `parses`: whether it is valid."""
+    """Compute a program's components from its outcome in each world. `parses`: whether it is valid Python."""
     ran = [(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)]
     reward = total([Share.of(*one) for one in ran])
     kinds = ["" if outcome.error is None else outcome.error.kind for outcome in outcomes]
@@ -150,7 +150,7 @@ def components_of(outcomes: Sequence[Outcome], asked: AskedWorlds, *, parses: bo
 
 
 class RewardWork(NamedTuple):
-    """A program whose reward `judge_works` computes, with a name that identifies it and its judge."""
+    """A program for `judge_works`, with a name that identifies the program and its requirements."""
 
     name: bytes  # the same for equal programs with equal requirements
     program: str

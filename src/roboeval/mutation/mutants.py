@@ -41,7 +41,7 @@ class Original:
 
 @dataclass(frozen=True)
 class Mutant:
-    """A correct program into which a mutation operator has put one mistake."""
+    """A correct program into which a mutation operator has introduced a mistake."""
 
     operator: str
     original: Original
@@ -60,7 +60,7 @@ class Mutant:
 
 
 def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, ...]:
-    """Return the right solutions of a task, then further programs, each syntax tree only once."""
+    """Return the right solutions of a task, followed by further programs, without equal syntax trees."""
     right = (Original(one.about, one.program) for one in solutions(task) if one.fails is None or one.right)
     distinct: dict[str, Original] = {}
     for original in chain(right, further):
@@ -85,7 +85,7 @@ def mutants(
 
 
 def sample_mutants(every: Iterable[Mutant], most: int, seed: int) -> tuple[Mutant, ...]:
-    """Sample up to `most` mutants evenly across operators. The order of `every` makes no difference."""
+    """Sample up to `most` mutants evenly across operators. The order of `every` does not matter."""
 
     def random_key(mutant: Mutant) -> bytes:
         return hashlib.sha256(f"{seed}\n{mutant.program}".encode(errors="surrogatepass")).digest()

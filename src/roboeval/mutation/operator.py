@@ -37,7 +37,7 @@ class Context:
         )
 
     def idle_rooms(self, program: ProgramTree) -> tuple[str, ...]:
-        """Return the rooms that a program does not mention: no string has a word of their names."""
+        """Return the rooms that a program never mentions: no string contains a word of their names."""
         texts = filter(None, map(text_of, program.nodes))
         named = {word for text in texts for word in re.findall(r"\w+", text.lower())}
         return tuple(room for room in self.rooms if not named & set(re.findall(r"\w+", room.lower())))
@@ -50,7 +50,7 @@ Condition: TypeAlias = Callable[[Context], bool]
 
 @dataclass(frozen=True)
 class Operator:
-    """A mutation operator: it puts one kind of mistake into programs, such as a missing drive."""
+    """A mutation operator, which introduces one kind of mistake into programs, such as a missing drive."""
 
     name: str  # such as `drop-the-return`
     about: str
@@ -58,7 +58,7 @@ class Operator:
 
 
 def operators_in(module: ModuleType) -> Iterator[Operator]:
-    """Yield an operator for each public function of a module. Its docstring says what its edits do."""
+    """Yield an operator for each public function of a module, described by the function's docstring."""
     for name, function in vars(module).items():
         if isfunction(function) and function.__module__ == module.__name__ and not name.startswith("_"):
             about = (function.__doc__ or "").removeprefix("Yield each edit that ").capitalize()
@@ -66,7 +66,7 @@ def operators_in(module: ModuleType) -> Iterator[Operator]:
 
 
 def only_if(condition: Condition) -> Callable[[Mutate], Mutate]:
-    """Return a decorator for an operator. It yields no edits for a task that does not meet the condition."""
+    """Return a decorator that makes an operator yield no edits for tasks that do not meet a condition."""
 
     def conditional(edits: Mutate) -> Mutate:
         @wraps(edits)

@@ -79,7 +79,7 @@ def _compiles(program: str) -> bool:
 
 
 def rewrite(node: Node, edit: Edit) -> Node:
-    """Copy a node, and replace the nodes in the copy as `edit` says. Put `pass` into an emptied body."""
+    """Copy a node, with the nodes in it replaced according to `edit`. Put `pass` into a body left empty."""
     fields: dict[str, object] = {}
     for name, value in ast.iter_fields(node):
         if isinstance(value, list):

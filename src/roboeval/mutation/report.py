@@ -65,7 +65,7 @@ def write_scores(scores: Sequence[MutationScore], folder: Path) -> None:
 
 
 def to_yaml(mutants: Iterable[Mutant]) -> str:
-    """Format mutants as YAML, to list them as equivalent in solutions/TASK.yaml. Reasons are empty."""
+    """Format mutants as YAML entries for `equivalent_mutants` in solutions/TASK.yaml, with empty reasons."""
     entries = [{"operator": one.operator, "diff": one.diff, "because": ""} for one in mutants]
     listed = {"equivalent_mutants": entries}
     return yaml.dump(listed, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)

@@ -52,7 +52,7 @@ class TriedMutant(NamedTuple):
 
 @dataclass(frozen=True)
 class MutationScore:
-    """The mutants of a task with their results, and the mutation score that follows from them."""
+    """The mutants of a task with their results, and the mutation score computed from them."""
 
     task: str
     worlds: int
@@ -66,12 +66,12 @@ class MutationScore:
 
     @property
     def score(self) -> float | None:
-        """The share of killed mutants among the killed and surviving ones, or None if there are none."""
+        """The share of mutants killed, out of those killed or surviving, or None if there are none."""
         return self._killed_of(MutantStatus.KILLED, MutantStatus.SURVIVED)
 
     @property
     def score_of_all(self) -> float | None:
-        """The share of killed mutants among all that change behaviour, or None if there are none."""
+        """The share of mutants killed, out of all that change behaviour, or None if there are none."""
         return self._killed_of(*CHANGING_STATUSES)
 
     def _killed_of(self, *statuses: MutantStatus) -> float | None:

@@ -23,7 +23,7 @@ def published() -> dict[str, Any]:
 
 
 def model_of(run: JudgedRun) -> str | None:
-    """Return the paper's name for a run's model, or None if another suite judged the run or no name fits."""
+    """Return the paper's name for a run's model, or None if it is unknown or another suite judged the run."""
     if run.results.manifest.get("suite") != PAPER_SUITE or run.is_mixed:
         return None
     provider, colon, name = (run.model or run.folder).lower().partition(":")
@@ -33,7 +33,7 @@ def model_of(run: JudgedRun) -> str | None:
 
 
 def recognised_models(runs: Iterable[JudgedRun]) -> list[str]:
-    """Return a list with a sentence that names the runs by models of the paper. Empty if there are none."""
+    """Say which runs are recognised as models of the paper, in one sentence. Return [] if none is."""
     pairs = [f"{run.name} is {model}" for run in runs if (model := model_of(run)) is not None]
     return [f"Recognised by name as models of the paper: {', '.join(pairs)}."] if pairs else []
 

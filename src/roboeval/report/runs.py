@@ -26,7 +26,7 @@ MAX_DRAWN_RUNS = 8  # readers cannot tell apart more colours
 
 @dataclass(frozen=True, eq=False)
 class JudgedRun:
-    """A run in a report: its verdicts and, if any, those by an ablation, another suite or house rules."""
+    """A run in a report, with its verdicts and any verdicts by an ablation, another suite or house rules."""
 
     results: Results
     table: pl.DataFrame  # the column `accepted` is null for unchecked programs
@@ -95,7 +95,7 @@ class JudgedRun:
 
     @cached_property
     def checked(self) -> tuple[CheckedPrompt, ...]:
-        """By prompt, how many programs the check accepts and how many pass. Empty if any is unchecked."""
+        """The numbers of accepted and passing programs of each prompt. Empty if any is unchecked."""
         return () if self.table["accepted"].null_count() else count_by_prompt(self.table)
 
 
@@ -106,14 +106,14 @@ def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def runs_to_draw(runs: Sequence[JudgedRun]) -> tuple[list[JudgedRun], list[str]]:
-    """Return the best runs, at most 8, and a list with a sentence for the caption if others are left out."""
+    """Return the best runs, at most 8, and a sentence for the caption (as a list) if others are left out."""
     best = sorted(runs, key=lambda run: -run.mean)[:MAX_DRAWN_RUNS]
     left_out = [f"Only the {len(best)} best of {len(runs)} runs are shown."] if len(best) < len(runs) else []
     return [run for run in runs if run in best], left_out
 
 
 def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
-    """Return sentences on how much of each run was judged, or one sentence if this is equal for all runs."""
+    """Return sentences on how much of each run was judged, or a single one if all are the same."""
     sentences: dict[str, list[str]] = {}
     for run in runs:
         sentences.setdefault(run.coverage_sentence, []).append(run.name)
@@ -151,7 +151,7 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
 
 
 def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
-    """Name each run by its label, else its model or folder. Add the folder or a number to equal names."""
+    """Name each run by its label, or else its model or folder. Add the folder or a number to duplicates."""
     given = [labels.get(at) or run.model or run.folder for at, run in enumerate(runs)]
     plain = [short_name(name, MAX_RUN_NAME) for name in given]
     with_folder = [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)]

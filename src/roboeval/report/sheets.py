@@ -48,7 +48,7 @@ class Column(NamedTuple):
 
 
 class Sheet(NamedTuple):
-    """A table of a report, which is also written as a CSV file."""
+    """A table of a report, also written as a CSV file."""
 
     name: str  # the key in page.yaml and the name of the CSV file
     columns: Sequence[Column]
@@ -59,7 +59,7 @@ class Sheet(NamedTuple):
 def sheet(
     name: str, rows: Sequence[Sequence[Any]], *, notes: Sequence[str] = (), shares: Sequence[str] = ()
 ) -> Sheet:
-    """Create a table with the columns that page.yaml gives, then a column of shares for each of `shares`."""
+    """Create a table with the columns listed in page.yaml, plus a column of shares for each of `shares`."""
     kinds = page_text("tables", name)["columns"]
     columns = [Column(head, kind) for part in kinds for kind, heads in part.items() for head in heads]
     return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)
@@ -86,7 +86,7 @@ class Groups(NamedTuple):
 
 
 class Card(NamedTuple):
-    """A run in brief: its pass@1, coverage, cost and most frequent failure."""
+    """A short summary of a run: its pass@1, coverage, cost and most frequent failure."""
 
     name: str
     passed: Estimate  # pass@1

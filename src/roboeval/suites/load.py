@@ -99,7 +99,7 @@ def installed_suites() -> EntryPoints:
 def installed_folder(name: str) -> Path | None:
     """Return the folder of a suite in an installed package, or None if no package has a suite of this name.
 
-    None of the package's code runs. Raises UserError if the name is ambiguous or the folder has no suite.
+    The package is not imported. Raises UserError if the name is ambiguous or the folder has no suite.
     """
     modules = [point.value.strip() for point in installed_suites().select(name=name)]
     if not modules:

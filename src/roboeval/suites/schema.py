@@ -47,7 +47,7 @@ class CheckFile(StrictForm):
     """A check in a task file: a formula that requirements name, such as `asks_in(room)`.
 
     Args:
-        means: the meaning of the check's regexes, for explanations, by kind of event. A string is for `say`.
+        means: what the regexes mean, for explanations, by kind of event. A plain string applies to `say`.
     """
 
     category: Category  # the kind of failure if the check fails
@@ -134,7 +134,7 @@ class SampledThingFile(StrictForm):
 
 
 class CornerFile(StrictForm):
-    """A world of a sampled task with some values set by hand. Other values are the first of their lists."""
+    """A world of a sampled task with some values set by hand. The rest use the first of their lists."""
 
     about: Name
     set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}
@@ -169,7 +169,7 @@ class TaskFile(_AnyTaskFile):
 
 
 class SampledTaskFile(_AnyTaskFile):
-    """A task file whose worlds are sampled. `let` defines values by name, `phrases` lists of regexes."""
+    """A task file whose worlds are sampled. `let` names values, and `phrases` names lists of regexes."""
 
     worlds: SampledWorldsFile
     let: dict[Name, Annotated[str, BeforeValidator(str)]] = {}
@@ -188,7 +188,7 @@ class LimitsFile(StrictForm):
 def _moment(value: object) -> object:
     if isinstance(value, datetime) and value.tzinfo is not None and 1970 <= value.year < 2100:  # noqa: PLR2004 - the message names these years
         return value
-    raise ValueError("a time in 1970 to 2099 with an offset is needed, such as 2024-01-01T12:00:00+00:00")
+    raise ValueError("use a time from 1970 to 2099 with an offset, such as 2024-01-01T12:00:00+00:00")
 
 
 class SimulationFile(StrictForm):

@@ -52,13 +52,13 @@ def locate_solution(task: Task, solution: Solution) -> tuple[Path, int | None]:
 
 
 def equivalent_mutants(task: Task) -> Mapping[tuple[str, str], str]:
-    """Return why a task's equivalent mutants are right, by mutation operator and diff (as in `bare_diff`)."""
+    """Map a task's known equivalent mutants, as (operator, `bare_diff`), to the reason why each is right."""
     listed = _read(task.path.parents[1], task).equivalent_mutants
     return {(one.operator, bare_diff(one.diff)): one.because.strip() for one in listed}
 
 
 def bare_diff(diff: str) -> str:
-    """Remove line numbers from a diff, so that it stays the same when other lines of a program move."""
+    """Remove line numbers from a diff, so that it stays the same when lines of the program move."""
     return "\n".join("@@" if line.startswith("@@") else line.rstrip() for line in diff.strip().splitlines())
 
 

@@ -49,7 +49,7 @@ class HouseRules:
     def read(
         cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (), *, of_suite: bool = False
     ) -> HouseRules:
-        """Read a file of house rules. Raise UserError if a rule is wrong or names a room not in `rooms`."""
+        """Read a file of house rules. Raise UserError if a rule is invalid or names a room not in `rooms`."""
         rules = read_rules(path, skills, rooms)
         if not of_suite and not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
             mend = "use lower-case letters, digits and dashes"
@@ -108,7 +108,7 @@ class Suite:
             seed: the random seed; by default the current seed.
 
         Raises:
-            UserError: the worlds are written by hand or depend on the suite's name, or a number is wrong.
+            UserError: the worlds are not sampled or depend on the suite's name, or `count` is out of range.
         """
         if self.worlds is None or self.folder is None:
             why = "are determined by its name" if self.is_generated else "are written by hand"

@@ -60,7 +60,7 @@ class TaskCheck:
     """A named formula in a task, such as `asks_in(room)`. Requirements call it with arguments.
 
     Args:
-        means: the meaning of its regexes, for explanations, by kind of event; may contain `{parameter}`.
+        means: what its regexes mean, for explanations, by kind of event; may contain `{parameter}`.
     """
 
     name: str  # the name that requirements use
@@ -103,7 +103,7 @@ class Task:
         return f"Task({self.name!r}, {prompts}, {worlds})"
 
     def judged_in(self, *, ablated: bool = False) -> tuple[Scenario, ...]:
-        """Return the worlds in which programs are judged; if `ablated`, the ablation's worlds or ()."""
+        """Return the worlds to judge programs in. If `ablated`, return those of the ablation, or ()."""
         return (self.ablation or ()) if ablated else self.scenarios
 
 

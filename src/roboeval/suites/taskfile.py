@@ -118,7 +118,7 @@ def _expect_different_worlds(form: TaskFile, file: YamlFile) -> None:
         first = numbers.setdefault(world.about.strip().casefold(), number)
         if first != number:
             sentence = f'worlds {first} and {number} have the same description "{world.about}"'
-            raise file.wrong(f"{sentence}; describe how they differ", "worlds", number - 1, "about")
+            raise file.wrong(f"{sentence}; give each its own description", "worlds", number - 1, "about")
 
 
 def _phrases(form: SampledTaskFile, file: YamlFile, words: Sequence[str]) -> dict[str, str]:
@@ -169,7 +169,7 @@ class _Reader:
         means = self._means(head, parameters)
         if unused := next((p for p in parameters if f"{{{p}}}" not in body.rtl), None):
             sentence = f'the check "{name}" does not use its parameter "{unused}"'
-            raise wrong(f"{sentence}; use {{{unused}}} in its rtl", "rtl")
+            raise wrong(f"{sentence}; add {{{unused}}} to the formula", "rtl")
         line = self.file.line(("checks", head))
         return TaskCheck(name, parameters, body.category, body.rtl, body.commonsense, line, means)
 

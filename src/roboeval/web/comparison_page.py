@@ -146,7 +146,7 @@ class Difference:
 
 
 def differences_of(runs: Sequence[Snapshot]) -> list[Difference]:
-    """Compare judged runs in pairs (if there are only two, also by task). This may take several seconds."""
+    """Compare judged runs in pairs; two runs also by task. This may take several seconds."""
     pairs = pairs_to_compare(runs, lambda run: 0.0 if run.pass_at_1 is None else run.pass_at_1.mean)
     return [_difference(*pair, by_task=len(runs) == RUNS_IN_PAIR) for pair in pairs]
 

@@ -43,7 +43,7 @@ class RunStore:
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """Return a run's latest snapshot. `key` names an evaluation, by default no ablation if possible."""
+        """Return a run's latest snapshot. `key` names an evaluation; by default, ablations are avoided."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
@@ -51,12 +51,12 @@ class RunStore:
         return self._reader(name, None).version()
 
     def report(self, name: str, part: str = REPORT_PAGE) -> bytes:
-        """Read a file of a run's report, such as its page. Raise UserError if it is absent or too large."""
+        """Read a file of a run's report, such as its page. Raise UserError if it is missing or too large."""
         path = self._reader(name, None).folder / "report" / part
         try:
             if _stamp(path, self.folder.resolve()) is not None:
                 if (size := path.stat().st_size) > MAX_REPORT_BYTES:
-                    raise UserError(f"{size:,} bytes are too many to show; open it on disk", file=path.name)
+                    raise UserError(f"the file is too big ({size:,} bytes); open it on disk", file=path.name)
                 return path.read_bytes()
         except OSError:
             pass

@@ -69,7 +69,7 @@ class CompletionFilter:
         return replace(self, task=None, prompt=None)
 
     def query(self, evaluation: str | None) -> str:
-        """Return the filter and `evaluation` as a URL query such as `?task=CountMen`, empty without both."""
+        """Return the filter and `evaluation` as a URL query such as `?task=CountMen`, or "" if empty."""
         values = {"evaluation": evaluation, **asdict(self)}
         if self.passed is not None:
             values["passed"] = str(self.passed).lower()
@@ -141,9 +141,9 @@ class Snapshot:
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
     def prompts(self, chosen: CompletionFilter) -> list[dict[str, Any]]:
-        """Count the `written` and `judged` completions of each prompt, and those selected (`counted`).
+        """Count each prompt's completions: `written`, `judged`, and `counted` (selected by the filter).
 
-        The filter's own task and prompt are ignored. `share` is counted / judged, or None if none is judged.
+        The filter's task and prompt are ignored. `share` is counted / judged, or None if none is judged.
         """
         judged = pl.col("judged")
         counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(

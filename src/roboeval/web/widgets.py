@@ -100,7 +100,7 @@ def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = 
 
 
 def count_text(data: Mapping[str, Any]) -> str:
-    """Format how many completions are judged or, if none is, written, such as `12 of 80 judged`."""
+    """Format progress as `12 of 80 judged`, or as `12 of 80 written` if no completion is judged."""
     if "completions" not in data:
         return MISSING
     coverage = Coverage(data["judged"], data["to_judge"], data["requested"])

@@ -117,12 +117,12 @@ def per_mission(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def comparable_tables(*tables: pl.DataFrame) -> Sequence[pl.DataFrame]:
-    """Return the tables. If any of them contains an agent's missions, change all of them by `per_mission`."""
+    """Return the tables, with `per_mission` applied to all of them if any contains an agent's missions."""
     return [*map(per_mission, tables)] if any(map(has_missions, tables)) else tables
 
 
 def compare_tables(first: pl.DataFrame, second: pl.DataFrame) -> Comparison:
-    """Compare two runs on their common prompts. If one table has missions, change both by `per_mission`."""
+    """Compare two runs on their common prompts, using `per_mission` tables if either contains missions."""
     found = compare_scores(*(pass_at_1(task_scores(table)) for table in comparable_tables(first, second)))
     if not (has_missions(first) or has_missions(second)):
         return found
@@ -141,7 +141,7 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
 def pairs_to_compare(
     runs: Sequence[RunLike], pass_at_1: Callable[[RunLike], float]
 ) -> list[tuple[RunLike, RunLike]]:
-    """Return all pairs of runs. If these are more than 10, pair each run only with the best by pass@1."""
+    """Return all pairs of runs or, if there are more than 10, pair each run only with the best by pass@1."""
     pairs = list(combinations(runs, 2))
     if len(pairs) <= MAX_PAIRS:
         return pairs
@@ -210,7 +210,7 @@ def _short(value: object) -> str:
 
 
 def failure_shares(table: pl.DataFrame) -> dict[str, float]:
-    """Return for each class of failure, by name, the share of judged completions that fail with it."""
+    """Return the share of judged completions that fail with each class of failure, by name."""
     return {one.name: one.share for one in failures(tally_of(table))}
 
 

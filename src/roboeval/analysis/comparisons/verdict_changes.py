@@ -30,7 +30,7 @@ class TaskChanges:
 
 @dataclass(frozen=True)
 class VerdictChanges:
-    """How the verdicts on a run change if a second suite judges it."""
+    """How the verdicts on a run change from one suite to another."""
 
     name: str
     suites: tuple[str, str]

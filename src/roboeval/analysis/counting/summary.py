@@ -57,7 +57,7 @@ class EvaluationSummary:
 def summarise(
     tally: Tally, suite: Suite, scope: JudgingScope, *, k: Sequence[int] = (1,), ablated: bool = False
 ) -> EvaluationSummary:
-    """Summarise an evaluation with pass@k for each k. Raise UserError if none is judged or k is too large."""
+    """Summarise an evaluation, with pass@k for each k. Raise UserError if it is empty or k is too large."""
     tasks = scores_of(tally, suite.tasks)
     if not tasks:
         raise UserError(f"0 of {how_many(scope.total)} are judged; run `roboeval evaluate`")

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 def compare(
     runs: Annotated[
         list[Path],
-        typer.Argument(help="Two judged runs; with --suites, one or more.", parser=path_to("a run")),
+        typer.Argument(help="Two judged runs, or at least one with --suites.", parser=path_to("a run")),
     ],
     suite: SuiteOption = "paper",
     suites: Annotated[
@@ -45,7 +45,7 @@ def compare(
         typer.Option(help="Two suites, such as paper,plus; shows which verdicts the second changes."),
     ] = None,
     most: Annotated[
-        int, typer.Option("--groups", min=0, help="With --suites: how many groups of programs to show.")
+        int, typer.Option("--groups", min=0, help="Number of groups of programs to show with --suites.")
     ] = 10,
     ablation: AblationOption = False,
     json: JsonOption = False,
@@ -94,7 +94,7 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
 
 
 def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:
-    """Print which verdicts the second of two suites (`paper,plus`) changes, and `most` groups of programs."""
+    """Print which verdicts change from the first to the second suite (`paper,plus`), in `most` groups."""
     from roboeval.analysis.comparisons.verdict_changes import changes_data, verdict_changes
     from roboeval.cli.views.comparison import changes_view
     from roboeval.evaluation.runs.completions import how_many

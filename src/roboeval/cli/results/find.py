@@ -28,7 +28,7 @@ def find(
     ] = False,
     task: Annotated[str | None, typer.Option(help="Only completions for this task.")] = None,
     world: Annotated[
-        str | None, typer.Option(help="Only in the world with this number, from 1, or description.")
+        str | None, typer.Option(help="Search only the world with this number (from 1) or description.")
     ] = None,
     most: Annotated[int, typer.Option("--groups", min=0, help="Number of failure groups to show.")] = 10,
     suite: SuiteOption = "paper",

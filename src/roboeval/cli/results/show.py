@@ -57,7 +57,7 @@ def show(
     rules: HouseRulesOption = None,
     k: Annotated[list[int] | None, typer.Option("--k", min=1, help="Also show pass@k for this k.")] = None,
     in_full: Annotated[
-        bool, typer.Option("--all", help="For a completion, also show satisfied worlds in full.")
+        bool, typer.Option("--all", help="For a completion, also show the steps in worlds where it passes.")
     ] = False,
     with_reply: Annotated[
         bool, typer.Option("--reply", help="For a completion, also show the original reasoning and reply.")
@@ -162,7 +162,7 @@ def show_completion(
 def export(
     run: RunArgument,
     format: Annotated[  # noqa: A002 - the option's name
-        str | None, typer.Option(help="csv or parquet; by default the ending of --out, otherwise csv.")
+        str | None, typer.Option(help="Either csv or parquet; by default the suffix of --out, or else csv.")
     ] = None,
     out: Annotated[
         Path | None,

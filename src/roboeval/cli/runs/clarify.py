@@ -26,7 +26,7 @@ def clarify(
         typer.Option(
             min=2,
             max=20,
-            help="Number of candidates for a prompt; by default what half of the prompts have, at most 10.",
+            help="Number of programs per question; by default as many as half of the prompts have, up to 10.",
             show_default=False,
         ),
     ] = None,
@@ -75,7 +75,7 @@ COLUMNS = {"one": "one program", "majority": "majority", "question": "one questi
 
 
 def clarify_view(data: Mapping[str, Any], title: str, candidates: int) -> RenderableType:
-    """Return a table of pass@1 by prompt: of one program, the most common behaviour, and after a question."""
+    """Return a table of pass@1 by prompt: one program, the most common behaviour, a person's choice."""
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text

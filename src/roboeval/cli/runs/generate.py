@@ -55,7 +55,7 @@ class GenerationRequest:
     out: Path | None
 
     def run_of(self, model: Model | BatchModel) -> RunFolder:
-        """Return the run folder given by --out, by default one named after the model."""
+        """Return the run folder given by --out, or else one named after the model."""
         from roboeval.evaluation.runs.folder import RunFolder
 
         folder = re.sub(r"[^\w.]+", "-", model.name).strip("-.")
@@ -117,7 +117,7 @@ def read_options(
     base_url: BaseUrlOption = None,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> GenerationRequest:
-    """Read the options that `generate` and `run` share. Exit with status 2 if they do not fit together."""
+    """Read the options that `generate` and `run` share. Exit with status 2 if they conflict."""
     from codebotler.models.open import KINDS_WITHOUT_TOOLS, choose_model, kind_of
     from roboeval.evaluation.agents.conversation import TurnLimits
     from roboeval.evaluation.agents.plan import DEFAULT_TURNS, AgentPlan

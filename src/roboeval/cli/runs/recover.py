@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @inherit_options(model_settings)
 def recover(
     source: Annotated[
-        str, typer.Argument(help="The programs that begin: a run, or another source as for `evaluate`.")
+        str, typer.Argument(help="The programs to interrupt: a run, or any source that `evaluate` reads.")
     ] = "recorded:careful",
     *,
     model: ModelOption = None,
@@ -35,7 +35,7 @@ def recover(
     json: JsonOption = False,
     **sampling: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
-    """Let skill calls fail, and judge how a model continues missions.
+    """Make skill calls fail, and judge how a model continues.
 
     For each task, the first right program runs several times in each world. Each time, another call fails.
     """
@@ -82,7 +82,7 @@ def recover(
 
 
 def recovery_view(results: Sequence[FaultResult], title: str) -> RenderableType:
-    """Return a table of the results with a row for each task and one for all of them."""
+    """Return a table of the results, with a row for each task and a total."""
     from rich.console import Group
     from rich.text import Text
 

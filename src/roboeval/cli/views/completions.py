@@ -62,9 +62,9 @@ def _program_line(program: Mapping[str, Any]) -> Text:
 def completion_view(
     data: Mapping[str, Any], *, in_full: bool = False, with_reply: bool = False
 ) -> RenderableType:
-    """Return a view of a completion's program and of the robot's steps, from the data of `completion_data`.
+    """Return a view of a completion's program and the robot's steps, from the data of `completion_data`.
 
-    `in_full` also shows satisfied worlds in full. `with_reply` adds the original reasoning and reply.
+    `in_full` also shows the steps in worlds where the program passes. `with_reply` adds reasoning and reply.
     """
     failure = data["failure"]
     why_none = None if failure is None else no_program_sentence(failure)

@@ -32,9 +32,9 @@ def found_view(
     groups: int,
     is_search: bool,
 ) -> RenderableType:
-    """Return a view of the failure groups `shown`. If `is_search`, it starts with the number found by task.
+    """Return a view of the failure groups `shown`, out of `groups` in all.
 
-    `found` has the completions found among `total`, `passed` those that passed. There are `groups` in all.
+    If `is_search`, it starts with the numbers found by task. `found` are the completions found among `total`.
     """
     failed = sum(one.key not in passed for one in found)
     parts: list[RenderableType] = []

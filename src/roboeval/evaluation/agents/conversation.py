@@ -24,14 +24,14 @@ MAX_REASONING = 200_000
 
 @dataclass(frozen=True)
 class TurnLimits:
-    """The limits of an agent's mission: the number of replies (turns), and of tokens (None: no limit)."""
+    """Limits on an agent's mission: the maximum numbers of replies (turns) and tokens (None: no limit)."""
 
     turns: int  # the number of replies
     tokens: int | None = None  # of all turns, as far as the model counts them
 
 
 class Conversation(ABC):
-    """A mission as a conversation with a model: send `prompt`, `add` the reply, until `prompt` is None."""
+    """Conducts a mission with a model: send `prompt`, `add` the reply, and repeat until `prompt` is None."""
 
     def __init__(self, mission: AgentMission, prompt: Prompt, limits: TurnLimits) -> None:
         self.mission, self.limits = mission, limits
@@ -40,7 +40,7 @@ class Conversation(ABC):
         self.result: str | None = None  # the result of the calls in the last reply
 
     def add(self, reply: Reply) -> None:
-        """Make the call in a reply or run its program. End the mission if the reply contains neither."""
+        """Execute the skill call or program in a reply. End the mission if the reply contains neither."""
         self.replies.append(reply)
         self.result = None
         if reply.no_program is None:
@@ -49,7 +49,7 @@ class Conversation(ABC):
             self.end(reply.no_program)
 
     def end(self, ending: str, why: str = "") -> None:
-        """End the mission with one of `ENDINGS`, such as `Rejected`. The program gets `why` as a comment."""
+        """End the mission with one of `ENDINGS`, such as `Rejected`. `why` is added as a comment."""
         self.prompt = None
         self.mission.end(ending, why)
 
@@ -102,7 +102,7 @@ class AgentConversation(Conversation):
 
 
 def mission_data(mission: AgentMission) -> dict[str, Any]:
-    """Return a mission's `program`, its `ending`, and `tool_errors`, the number of mistakes of each kind."""
+    """Return a mission's `program`, its `ending`, and `tool_errors`, which counts mistakes by kind."""
     return {
         "program": mission.program,
         "ending": mission.ending,

@@ -37,7 +37,7 @@ UNKNOWN_SETTINGS = SamplingSettings(temperature=None, top_p=None)  # a client ha
 
 @dataclass
 class MissionDesk:
-    """Gives an MCP client the unfinished missions of a run, one at a time, and saves each at its end."""
+    """Hands the unfinished missions of a run to an MCP client one at a time, and saves each when it ends."""
 
     plan: AgentPlan
     model: str  # the name of the model behind the client
@@ -60,7 +60,7 @@ class MissionDesk:
         ]
 
     def call(self, name: str, arguments: dict[str, Any]) -> str:
-        """Call one of the `tools` for the client. Return the result, or what the call got wrong, as text."""
+        """Call one of the `tools` for the client. Return the result or an error message."""
         if self._current is None:
             return self._begin() if name == NEXT else f"There is no mission; call {NEXT}."
         key, mission = self._current
@@ -80,7 +80,7 @@ class MissionDesk:
         return f"{result}\n{_OVER}"
 
     def leave(self) -> None:
-        """End the current mission, if any, because the client has left. The mission cannot be tried again."""
+        """End and save the current mission, if any, because the client has left. It cannot be resumed."""
         if self._current is not None:
             self.call(GIVE_UP, {"reason": "the client has left"})
 
@@ -108,7 +108,7 @@ class MissionDesk:
 
 @contextlib.contextmanager
 def open_desk(run: RunFolder, plan: AgentPlan, model: str) -> Iterator[MissionDesk]:
-    """Lock a run, and yield a desk with its unfinished missions. Saved rows name the client's `model`."""
+    """Lock a run, and yield a desk with its unfinished missions. `model` is the model name in saved rows."""
     with run.writing():
         about, _, todo = begin_batch(run, plan, model, UNKNOWN_SETTINGS)
         write_whole(run.about, to_text(about))

@@ -48,12 +48,12 @@ _TASK = "def task_program():\n"
 
 @dataclass
 class AgentMission:
-    """Makes an agent's calls in one world until the mission ends, and writes them as a program.
+    """Executes an agent's calls in one world until the mission ends, and records them as a program.
 
     Args:
         suite: the suite with the skills, the house rules and the settings of the simulation.
-        scenario: the world, and what is required there.
-        contracts: limits on what the robot may do. A call outside of them ends the mission.
+        scenario: the world and its requirements.
+        contracts: limits on what the robot may do. A call that violates one ends the mission.
     """
 
     suite: Suite
@@ -93,7 +93,7 @@ class AgentMission:
         return text
 
     def refuse(self, kind: str, sentence: str, what: str) -> str:
-        """Count a mistake, add `what` as a comment, and return a message. Three in a row end the mission."""
+        """Count a mistake, add a comment, and return a message. End the mission after three in a row."""
         self.mistakes[kind] += 1
         self._in_a_row += 1
         self._note(f"{kind}: {what}")
@@ -116,13 +116,13 @@ class AgentMission:
             self._note(f"In the end: {text}")
 
     def end(self, ending: str, why: str = "") -> None:
-        """End the mission with one of `ENDINGS`, such as `TurnLimit`. The program gets `why` as a comment."""
+        """End the mission with one of `ENDINGS`, such as `TurnLimit`. `why` is added as a comment."""
         self.ending = ending
         if why:
             self._note(f"{ending}: {why}")
 
     def give_up(self, reason: str) -> str:
-        """End the mission. Return a message. The ending is `GaveUp`, or `error` if the last call failed."""
+        """End the mission and return a message. The ending is `GaveUp` (`error` if the last call failed)."""
         at, lines = self.robot.try_at, self.robot.lines
         self.ending = GAVE_UP if at is None else ERROR
         if at is not None:

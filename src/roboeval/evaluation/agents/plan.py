@@ -45,7 +45,7 @@ class AgentPlan(GenerationPlan):
     has_turns: ClassVar[bool] = True
 
     def keys(self) -> list[CompletionKey]:
-        """Return all keys. In 3 worlds, indexes 0, 1, 2 are the first missions, and 3, 4, 5 the second."""
+        """Return all keys. With 3 worlds, indexes 0 to 2 are the first mission in each, 3 to 5 the second."""
         first = GenerationPlan(self.suite, self.tasks, 1)
         prompts = [(task, prompt) for task, prompt, _ in first.keys()]  # noqa: SIM118 - a plan is no mapping
         return [
@@ -88,12 +88,12 @@ class AgentPlan(GenerationPlan):
         return row_for(key, self.instruction(key), model, where | conversation.data())
 
     def begin(self, key: CompletionKey) -> Conversation:
-        """Return a new conversation for the mission `key` (task, prompt and index of the completion)."""
+        """Create the conversation for the mission `key` (task, prompt and index of the completion)."""
         kind = AgentConversation if self.mode == "agent" else ReplanConversation
         return kind(self.begin_mission(key), self.prompt(key), self.limits)
 
     def begin_mission(self, key: CompletionKey) -> AgentMission:
-        """Return the new mission `key`, in its world and with the requirements of its prompt."""
+        """Create the mission `key`, in its world and with the requirements of its prompt."""
         contracts = () if self.contract is None else (self.contract,)
         scenario = self.suite.tasks[key[0]].scenarios[self.world(key)].asked_by(key[1])
         return AgentMission(self.suite, scenario, contracts)
@@ -106,7 +106,7 @@ class AgentPlan(GenerationPlan):
         return agent_prompt(self.instruction(key), rules=rules, skills=skills)
 
     def world(self, key: CompletionKey) -> int:
-        """Return the index, in the task, of the world in which the mission `key` takes place."""
+        """Return the index of the world in which the mission `key` takes place."""
         return key[2] % self._worlds(key[0])
 
     def _worlds(self, task: str) -> int:

@@ -27,9 +27,9 @@ class Engine(Protocol):
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
-        """Run `function` once for each distinct work, and yield `then(result)` for all works, in order.
+        """Run `function` on batches of distinct works, and yield `then(result)` for every work, in order.
 
-        A work is a task's name and a program. `function` and `then` may run in other processes, so they and
+        A work is a task name and a program. `function` and `then` may run in other processes, so they and
         their results must be picklable.
         """
 
@@ -63,7 +63,7 @@ class Local:
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
-        """Run each distinct program once, as `Engine.map_distinct` describes."""
+        """Run each distinct program once, and yield `then(result)` for every work, as in `Engine`."""
         here = self._pool.here
         return self._pool.map_distinct(
             lambda some: function(here(), some), works, name=lambda work: digest(*work), then=then
@@ -72,7 +72,7 @@ class Local:
 
 @cache
 def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = False) -> Worker:
-    """Return this process's worker, started only once. Raise EngineError if it cannot isolate as required."""
+    """Return this process's worker, started on first use. Raise EngineError if required isolation fails."""
     worker = Worker(one_process_per_run=one_process_per_run)
     if require_isolation and not worker.has_seccomp:
         worker.close()

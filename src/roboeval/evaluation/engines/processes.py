@@ -41,7 +41,7 @@ class Processes:
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
-        """Run each distinct program once, as `Engine.map_distinct` describes."""
+        """Run each distinct program once, and yield `then(result)` for every work, as in `Engine`."""
         functions = pickle.dumps((function, then))
         with process_pool(self._workers) as processes:
 
@@ -57,7 +57,7 @@ class Processes:
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of processes, which end with the block, or with this process if that ends first."""
+    """Yield a pool of processes that end with the `with` block, or when this process dies."""
     context = get_context("spawn")
     with ExitStack() as held:
         with starting_processes():
@@ -93,7 +93,7 @@ def exit_with_parent(pipe: Connection) -> None:
 
 
 def run_batch(functions: bytes, isolation: Mapping[str, bool], works: Sequence[Work]) -> list[Any]:
-    """Run and judge programs with this process's worker. `functions`: the pickled ones of `map_distinct`."""
+    """Run and judge programs with this process's worker. `functions` holds pickled `function` and `then`."""
     function, then = load_functions(functions)
     return [then(ran) for ran in function(own_worker(**isolation), works)]
 

@@ -68,7 +68,7 @@ class RayCluster:
     def map_distinct(
         self, function: RunPrograms[RawResult], works: Iterable[Work], then: Callable[[RawResult], WorkResult]
     ) -> Iterator[WorkResult]:
-        """Run each distinct program once, as `Engine.map_distinct` describes."""
+        """Run each distinct program once, and yield `then(result)` for every work, as in `Engine`."""
         # Never cancel shards: Ray 2.60 can abort this process if a cancelled shard has just ended.
         remote = self._ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=False)(run_shard)
         functions = self._ray.put((function, then))
@@ -136,7 +136,7 @@ def run_shard(
     versions: str,  # a machine with other versions might judge differently
     isolation: Mapping[str, bool],
 ) -> tuple[list[WorkResult], str | None]:
-    """Run programs in a Ray process. Return the results, and a warning about isolation (None: complete)."""
+    """Run programs in a Ray process. Return the results, and a warning if isolation is incomplete."""
     machine = platform.node()
     if versions != VERSIONS:
         raise EngineError(f"{machine} has {VERSIONS}; install {versions} there")

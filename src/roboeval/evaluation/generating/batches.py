@@ -66,7 +66,7 @@ def write_requests(
 
 
 def request_id(about: Mapping[str, Any], key: CompletionKey, instruction: str) -> str:
-    """Return a request's name, TASK/PROMPT/INDEX/HASH. The hash tells apart runs with different settings."""
+    """Return a request's name, TASK/PROMPT/INDEX/HASH. Runs with different settings differ in the hash."""
     mark = hashlib.sha256(to_line([*(about.get(name) for name in IDENTITY), instruction])).hexdigest()[:8]
     task, prompt, index = key
     return f"{task}/{prompt}/{index}/{mark}"
@@ -138,7 +138,7 @@ def _row(
 def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:
     about = about_of(run)
     if not batches(about):
-        raise UserError("was not started by `roboeval generate --requests`; use one that was", file=run.path)
+        raise UserError("was not started by `roboeval generate --requests`; name another run", file=run.path)
     if about.get("suite") != suite.name:
         sentence = f'belongs to the suite "{about.get("suite")}"; select that suite with --suite'
         raise UserError(sentence, file=run.path)
@@ -166,7 +166,7 @@ def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> BatchAnswer:
         raise UserError("this line is not JSON; the file may be incomplete, so download it again")
     key, response, error = ids.get(str(row.get("custom_id"))), row.get("response"), row.get("error")
     if "response" not in row and "error" not in row:
-        raise UserError("this line is not an answer from a batch endpoint; choose the file of answers")
+        raise UserError("this line is not an answer from a batch endpoint; choose the endpoint's output file")
     if key is None:
         name = repr(row.get("custom_id"))
         raise UserError(f"the request {name} was made by another run or with other settings; choose its run")

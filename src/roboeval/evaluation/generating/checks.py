@@ -26,7 +26,7 @@ ProgramKey: TypeAlias = tuple[str, str]  # the name of a task and the hash of a 
 def check_programs(
     run: RunFolder, suite: Suite, completions: Iterable[Completion], engine: OpenEngine
 ) -> Iterator[tuple[ProgramKey, list[str]]]:
-    """Yield the task and hash of each distinct program, and its problems as sentences (none: accepted).
+    """Yield (task, hash) of each distinct program, and its problems as sentences ([] if it is accepted).
 
     Programs that this run has checked already are not checked again. The check uses the rooms of the task's
     first world and the suite's house rules.

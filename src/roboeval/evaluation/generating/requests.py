@@ -57,7 +57,7 @@ class GenerationPlan:
         return prompt_for(self.instruction(key), rules=rules, skills=skills)
 
     def sample(self, key: CompletionKey) -> int:
-        """Return a number, from 0, that differs between a prompt's completions, to vary the model's seed."""
+        """Return the index of a completion among those of its prompt. It varies the model's seed."""
         return key[2]
 
     def copied_completions(self) -> Iterable[Completion]:
@@ -106,12 +106,12 @@ class RoundPlan(GenerationPlan):
     problems: Mapping[CompletionKey, Sequence[str]] = field(repr=False)
 
     def prompt(self, key: CompletionKey) -> Prompt:
-        """Return the prompt for a completion. A repair's prompt has the rejected program and its problems."""
+        """Return the prompt for a completion. A repair includes the rejected program and its problems."""
         first, program = super().prompt(key), self.earlier[key].program
         return first.after(program, self.problems[key]) if self.repairs and program.strip() else first
 
     def sample(self, key: CompletionKey) -> int:
-        """Return a number that differs between completions and between rounds, to vary the model's seed."""
+        """Return a number that differs between samples and rounds of a prompt. It varies the model's seed."""
         return key[2] + self.number * SAMPLE_STRIDE
 
     def copied_completions(self) -> Iterator[Completion]:
@@ -221,10 +221,10 @@ def timestamp() -> str:
 
 
 class RequestLog:
-    """Logs requests, to count those that an interruption left pending. They may be billed twice.
+    """Logs requests, to count those left pending by an interruption. They may be billed twice.
 
     Each request is logged before it is sent, and again if it ends without a completion. Any other request
-    without a completion was pending. Each command starts a new file, and deletes the file at a normal end.
+    without a completion was pending. Each command starts a new file, and deletes it on normal exit.
     """
 
     def __init__(self, path: Path, done: set[CompletionKey]) -> None:

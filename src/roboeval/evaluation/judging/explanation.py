@@ -69,7 +69,7 @@ def suite_instruction(suite: Suite | None, task: str, prompt: int) -> str | None
 
 
 def instruction_shown(recorded: str | None, of_suite: str | None) -> tuple[str | None, str | None]:
-    """Return a note (None if the instruction was recorded), and the instruction to show (None if unknown)."""
+    """Return a note (None if an instruction is recorded), and the instruction to show (None if unknown)."""
     if recorded is not None or of_suite is None:
         return INSTRUCTION_NOT_RECORDED if recorded is None else None, recorded
     return f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}", of_suite
@@ -81,13 +81,13 @@ def failing_first(worlds: Iterable[Mapping[str, Any]]) -> list[tuple[int, Mappin
 
 
 class ExplanationBudget:
-    """Limits how much of a completion's traces is analysed to explain failed checks."""
+    """Limits the total size of a completion's traces that are analysed to explain failed checks."""
 
     def __init__(self) -> None:
         self._left = MAX_EXPLAINED_SIZE
 
     def covers(self, trace: Trace) -> bool:
-        """Subtract a trace's size from the budget. Return whether there was enough to explain a check."""
+        """Subtract a trace's size from the budget. Return False if the budget was too small."""
         texts = [text for event in trace for text in (event.text, *(option.text for option in event.options))]
         self._left -= EVENT_SIZE * len(trace) + sum(map(len, texts))
         return self._left >= 0
@@ -139,7 +139,7 @@ def error_sentence(verdict: Mapping[str, Any]) -> str:
 
 
 def first_lines(program: str) -> tuple[str, int]:
-    """Return the first 1,000 lines of a program, with long lines shortened, and how many others there are."""
+    """Return the first 1,000 lines of a program, shortened if long, and the number of lines left out."""
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MAX_PROGRAM_LINES])
     return shown, max(0, len(lines) - MAX_PROGRAM_LINES)

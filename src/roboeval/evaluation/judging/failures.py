@@ -95,7 +95,7 @@ def plural_of(name: str) -> str:
 
 
 def classes_to_show(happened: Collection[str]) -> list[str]:
-    """Return the names of failure classes to show: the paper's three, and others only if they `happened`."""
+    """Return the names of the failure classes to show: the paper's three, and any others that `happened`."""
     return [name for name, one in FAILURE_CLASSES.items() if one.is_always_shown or name in happened]
 
 
@@ -116,7 +116,7 @@ class Verdict:
     satisfied: bool
 
     def on(self, prompt: int) -> Verdict:
-        """Return the verdict for one prompt, without the requirements that only other prompts ask for."""
+        """Return the verdict for one prompt, which ignores requirements that this prompt does not ask for."""
         asked = tuple(requirement for requirement in self.failed if requirement.is_asked_by(prompt))
         if len(asked) == len(self.failed):
             return self

@@ -45,7 +45,7 @@ def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
 
 
 def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
-    """Return whether a run finished, or timed out where programs may wait forever. Otherwise, it fails."""
+    """Return whether a run can pass: it finished, or timed out in a world where programs may wait forever."""
     waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
     return waited or outcome.status is Status.FINISHED
 
@@ -102,7 +102,7 @@ def evaluate(
 def judgements(
     completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
 ) -> Iterator[tuple[Completion, bytes | None]]:
-    """Yield each completion with its judgement as JSON, or with None and a warning if that takes too long."""
+    """Yield each completion with its judgement as JSON, or None and a warning if judging takes too long."""
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[Work]:
@@ -184,7 +184,7 @@ def robot_in(world: World, suite: Suite) -> SimulatedRobot:
 
 
 def guard_of(suite: Suite, contracts: Sequence[Contract] = ()) -> RuleGuard | None:
-    """Return a guard that stops calls against house rules or contracts, or None if there are neither."""
+    """Return a guard that stops calls that break house rules or contracts, or None if there are no rules."""
     if suite.house is None and not contracts:
         return None
     return RuleGuard(suite.house_rules, contracts=contracts)
@@ -221,7 +221,7 @@ CachedResult = TypeVar("CachedResult")
 
 
 class ResultCache(Generic[CachedResult]):
-    """Caches results by run, because many programs behave identically in a world or in similar worlds."""
+    """Caches results computed from runs, because many programs behave identically in the same worlds."""
 
     def __init__(self) -> None:
         # Keys contain object ids, which must not be reused, so entries keep the objects alive.

@@ -60,7 +60,7 @@ def row_line(completion: Completion, judgement_json: bytes) -> bytes:
 
 
 def judgements_for(verdicts: list[Verdict], prompts: int) -> tuple[bytes, ...]:
-    """Return the judgement for each of `prompts` prompts, as JSON. Equal judgements are the same object."""
+    """Return the judgement for each of `prompts` prompts, as JSON. Equal judgements share one object."""
     known_judgements: list[tuple[list[Verdict], bytes]] = []
     chosen = []
     for prompt in range(prompts):

@@ -13,7 +13,7 @@ CLOCK_CHECKS = 100  # number of clock checks before the limit; each also lets ot
 
 
 class TimeLimitExceeded(Exception):  # noqa: N818 - a signal, not an error
-    """Raised by `time_limit` in its block when the processor time is used up."""
+    """Raised inside a `time_limit` block when the processor time is used up."""
 
 
 @contextlib.contextmanager

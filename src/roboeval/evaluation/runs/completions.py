@@ -29,7 +29,7 @@ NO_PROGRAM_COLUMN = "no_program"  # the table column for replies without a progr
 
 
 class MissionEnd(NamedTuple):
-    """The only world in which an agent carried out a mission, and how the mission ended."""
+    """The world in which an agent's mission took place, and how the mission ended."""
 
     world: int  # the index of the world in its task
     ending: str  # one of `ENDINGS`, such as `TurnLimit`
@@ -71,7 +71,7 @@ class Completion:
             if not isinstance(text, str) and (text is not None or name in REQUIRED):
                 raise UserError(f"the {name} is {text!r}, but it must be a string")
         if "world" in self.more and self.mission is None:
-            raise UserError(f'a mission needs a "world" from 0 and as "ending" one of {", ".join(ENDINGS)}')
+            raise UserError(f'a mission needs a "world" from 0 and an "ending", one of {", ".join(ENDINGS)}')
         if (kind := self.more.get(NO_PROGRAM_COLUMN)) not in (None, *NO_PROGRAM_KINDS):
             raise UserError(
                 f'"{NO_PROGRAM_COLUMN}" is {kind!r}; use null or one of {", ".join(NO_PROGRAM_KINDS)}'
@@ -100,7 +100,7 @@ class Completion:
 
     @property
     def finish_reason(self) -> str | None:
-        """Return the server's reason why the reply ended, such as `stop` or `length`, or None if unknown."""
+        """Return the server's reason for ending the reply, such as `stop` or `length`, or None if unknown."""
         reason = self.more.get("finish_reason")
         return reason if isinstance(reason, str) else None
 
@@ -111,7 +111,7 @@ class Completion:
 
     @property
     def mission(self) -> MissionEnd | None:
-        """Return the world and the ending of an agent's mission, or None if the model wrote a program."""
+        """Return the world and ending of an agent's mission, or None if the model wrote a program."""
         world, ending = self.more.get("world"), self.more.get("ending")
         is_valid = type(world) is int and 0 <= world < NUMBER_LIMIT and ending in ENDINGS
         return MissionEnd(world, ending) if is_valid else None  # type: ignore[arg-type]  # `is_valid` has checked them
@@ -215,7 +215,7 @@ def _expect_new(key: CompletionKey, seen: dict[CompletionKey, int], number: int)
 
 
 def check_length(row: Mapping[str, Any], file: str | None) -> None:
-    """Raise UserError if a row is too long to be copied into a run. The error names `file`, unless None."""
+    """Raise UserError if a row is too long to be copied into a run. The error names `file`, if given."""
     if len(to_line(row)) > MAX_ROW:
         raise UserError(f"this row is longer than {MAX_ROW:,} bytes; shorten the program", file=file)
 

@@ -150,15 +150,15 @@ def read_results(
     reuse_from: Results | None = None,
     progress: ShowProgress = lambda lines, _: lines,
 ) -> Results:
-    """Read an evaluation of a run. Each file is read once.
+    """Read an evaluation of a run, with its completions and verdicts.
 
     Args:
         run: the run.
         key: the name of the evaluation, or None if the run has not been judged.
         suite: the suite that judged the run, or None if it is not available.
-        task: the only task whose rows are read, by default all tasks.
+        task: the only task whose rows are read; by default, all tasks are read.
         reuse_from: another evaluation of the same run whose completions can be reused.
-        progress: a function that gets the rows and their number, shows progress, and yields the rows.
+        progress: a function that yields the given rows and shows progress; it also gets their number.
     """
     if reuse_from:
         about, completions = reuse_from.about, reuse_from.completions

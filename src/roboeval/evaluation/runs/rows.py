@@ -50,8 +50,8 @@ Numbered: TypeAlias = list[Annotated[list[int | str | None], msgspec.Meta(min_le
 class WorldVerdict(TypedDict):
     """The judgement in one world.
 
-    The function `circumstances` describes `places`, `holding`, `to` and `destinations`. If the trace is too
-    long for the row, only its first events are there, and `cut` counts the others.
+    See `circumstances` for `places`, `holding`, `to` and `destinations`. If the trace is too long for the
+    row, only its first events are stored, and `cut` counts the rest.
     """
 
     world: str
@@ -76,7 +76,7 @@ class Row(TypedDict):
         prompt: the number of the phrasing, from 0.
         index: the number of the sample, from 0.
         program_sha256: the hash of the program that was judged.
-        mission_world: the index of the only world that was judged, if an agent acted there; else no entry.
+        mission_world: the index of the only judged world of an agent's mission; absent for programs.
         passed: whether the program satisfies the requirements in all worlds.
         failure: the first failure, or None if the program passed.
         verdicts: the judgement in each world, in order.
@@ -129,7 +129,7 @@ def _expect_consistent(row: Row, data: object) -> None:
     if row["passed"] != (failure is None):
         raise ValueError("`failure` must be null if and only if the completion passes")
     if failure is not None and not 0 <= failure["world"] < len(row["verdicts"]):
-        raise ValueError("the world of the failure does not exist")
+        raise ValueError("`failure` names a world that does not exist")
     for verdict in row["verdicts"]:
         Status(verdict["status"])
 
@@ -190,7 +190,7 @@ def take_judged(left: dict[CompletionKey, Completion], line: LocatedRow, file: P
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
-    """Yield the task and hash of each checked program, with its problems as sentences (none: accepted)."""
+    """Yield (task, hash) of each checked program, and its problems as sentences ([] if it was accepted)."""
     for number, row in read_rows(path):
         match row:
             case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
@@ -200,13 +200,13 @@ def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
 
 
 class Seal:
-    """Counts and hashes the rows of an evaluation. KEY.json stores the result, to reveal later changes."""
+    """Counts and hashes the rows of an evaluation. KEY.json stores the result, to detect later changes."""
 
     def __init__(self) -> None:
         self._count, self._hash = 0, hashlib.sha256()
 
     def add(self, line: bytes) -> None:
-        """Count and hash a line that was read or written."""
+        """Add a line to the count and the hash."""
         self._count += bool(line.strip())
         self._hash.update(line)
 
@@ -215,7 +215,7 @@ class Seal:
         return {"rows": self._count, "sha256": self._hash.hexdigest()}
 
     def is_broken(self, manifest: Mapping[str, Any]) -> bool:
-        """Return whether the rows differ from those that the content of KEY.json, `manifest`, describes."""
+        """Return whether the rows differ from those sealed in `manifest`, the content of KEY.json."""
         return is_sealed(manifest) and any(manifest.get(name) != value for name, value in self.data().items())
 
 

@@ -60,7 +60,7 @@ class JudgingScope:
         about: Mapping[str, Any] = {},
         suite: Suite | None = None,
     ) -> JudgingScope:
-        """Count completions by task, and models, missions and cut-off replies only of `tasks` (None: all)."""
+        """Count completions by task. Consider only `tasks` for models, missions and cut-offs (None: all)."""
         every = list(completions)
         selected = [one for one in every if tasks is None or one.task in tasks]
         missions = [(one.mission.ending, one.turns) for one in selected if one.mission is not None]
@@ -88,7 +88,7 @@ class JudgingScope:
 
     @property
     def missions_sentence(self) -> str | None:
-        """A sentence about the turns and endings of an agent's missions, or None if there are no missions."""
+        """A sentence about the turns and endings of agent missions, or None if there are no missions."""
         if not (count := sum(self.endings.values())):
             return None
         ended = ", ".join(f"{ending} {number:,}" for ending, number in Counter(self.endings).most_common())

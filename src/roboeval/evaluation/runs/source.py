@@ -17,7 +17,7 @@ from roboeval.suites.load import Suite
 
 @dataclass(frozen=True)
 class Source:
-    """Completions, with the run that contains them if they come from a run."""
+    """Completions, and the run that they were read from, if any."""
 
     completions: Sequence[Completion]  # all completions for tasks of the suite
     run: RunFolder | None = None

@@ -91,12 +91,12 @@ def with_cost(table: pl.DataFrame, price: Price) -> pl.DataFrame:
 
 
 def keys_where(table: pl.DataFrame, condition: pl.Expr) -> list[CompletionKey]:
-    """Return the keys of the completions whose first row meets a condition on the columns."""
+    """Return the keys of the completions whose first row matches a condition on the columns."""
     return [*table.filter(condition, pl.col("world_number") == 0).select(KEY).iter_rows()]
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
-    """Return the table with `accepted` filled in: whether `problems[task, hash]` is empty (null: missing)."""
+    """Fill in the column `accepted`: whether `problems[task, hash]` is empty, or null if it is missing."""
     names = ["task", "program_sha256"]
     answers = [(*key, not found) for key, found in problems.items()]
     accepted = pl.DataFrame(
@@ -190,7 +190,7 @@ TABLE_BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # the first bytes of 
 
 
 def table_format(path: Path | None) -> str:
-    """Return `parquet` for a file name with this ending, or `csv` for any other name and for None."""
+    """Return `parquet` if the file name has this suffix, or else `csv`."""
     ending = "" if path is None else path.suffix.removeprefix(".").lower()
     return ending if ending in TABLE_FORMATS else TABLE_FORMATS[0]
 

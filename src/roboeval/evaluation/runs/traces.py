@@ -18,8 +18,8 @@ def circumstances(trace: Trace) -> dict[str, list[list[Any]]]:
 
     - `places`: `[number, room]`, the room from that event on; the last number may be one more than the
       number of events.
-    - `holding`: `[number, thing]`, what the robot holds from that event on, or an empty text for nothing; at
-      the start, it holds nothing.
+    - `holding`: `[number, thing]`, what the robot holds from that event on, or an empty string for nothing;
+      at the start, it holds nothing.
     - `to`: `[number, person]`, whom events of the same kind ask from that event on, or null for nobody.
     - `destinations`: `[number, room]`, the goal of a drive if it differs from the place of the next event, or
       null if the drive failed.
@@ -54,7 +54,7 @@ def _changes_by_kind(trace: Trace) -> list[list[Any]]:
 
 
 def first_events(verdict: Mapping[str, Any], count: int) -> dict[str, Any]:
-    """Cut a verdict (as JSON data) to its first `count` events. Keep the place after the last of them."""
+    """Cut a verdict (as JSON data) to its first `count` events. Keep the place after the last one."""
     known = {name: verdict[name] for name in CIRCUMSTANCES if name in verdict}
     kept = {
         name: [entry for entry in entries if entry[0] <= count + (name == "places")]

@@ -17,7 +17,7 @@ from roboeval.evaluation.runs.rows import key_of
 
 
 class TurnLog:
-    """Saves each reply to an agent at once, so that an interrupted mission goes on where it stopped."""
+    """Saves each of a model's replies as an agent at once, so that an interrupted mission can resume."""
 
     def __init__(self, path: Path, done: Collection[CompletionKey]) -> None:
         self._replies: dict[CompletionKey, list[Reply]] = {}

@@ -22,7 +22,7 @@ ENDS = ast.Break | ast.Continue | ast.Return
 
 
 def before_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that moves the last iteration of a loop behind the code that follows the loop."""
+    """Yield each edit that moves the last iteration of a loop after the code that follows the loop."""
     for block in program.blocks:
         for at, loop in enumerate(block):
             after = block[at + 1 :]

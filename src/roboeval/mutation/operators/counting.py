@@ -68,7 +68,7 @@ def _remembers(node: ast.AST) -> bool:
 
 
 def only_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that keeps only the last item instead of adding it to the previous ones."""
+    """Yield each edit that replaces the previous items or sum with the last item instead of adding it."""
     for node in program.nodes:
         match node:
             case ast.AugAssign(target, ast.Add(), value):

@@ -41,7 +41,7 @@ def bring_nothing(program: ProgramTree, _: Context) -> Edits:
 
 @only_if(_is_put_down)
 def place_by_words(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that replaces a step that puts down an object with a message that it is here."""
+    """Yield each edit that makes the robot say that an object is here instead of putting it down."""
     return ({step: statement('say("Here it is.")')} for step, _call in program.steps("place"))
 
 

@@ -85,12 +85,12 @@ def return_elsewhere(program: ProgramTree, context: Context) -> Edits:
 
 @only_if(COMING_BACK)
 def return_to_here(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that replaces the drive back with a drive to the current location."""
+    """Yield each edit that makes the robot drive to where it already is instead of to the starting point."""
     return ({place: expression("get_current_location()")} for place in _return_places(program).values())
 
 
 def drive_by_words(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that replaces a drive with a message that announces it."""
+    """Yield each edit that makes the robot announce a drive instead of driving."""
     for step, call in program.steps("go_to"):
         if (place := argument(call, 0)) is not None:
             yield {step: statement('say(f"I am going to {place}")', place=place)}
@@ -147,12 +147,12 @@ def _looks_in_loops(program: ProgramTree) -> Iterator[tuple[ast.For | ast.While,
 
 
 def drop_the_look(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that replaces a look with true, so that a person or thing counts as present."""
+    """Yield each edit that replaces an `is_in_room` call with true, as if what it looks for were there."""
     return ({call: expression("True")} for call in _looks(program))
 
 
 def see_nothing(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that replaces a look with false, so that a person or thing counts as absent."""
+    """Yield each edit that replaces an `is_in_room` call with false, as if what it looks for were absent."""
     return ({call: expression("False")} for call in _looks(program))
 
 
@@ -165,7 +165,7 @@ def look_once(program: ProgramTree, _: Context) -> Edits:
 
 
 def look_at_first_only(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that lets a loop look only in two iterations, and then assume success."""
+    """Yield each edit that makes a loop look only in its first two iterations, and then assume success."""
     for loop, look in _looks_in_loops(program):
         after = rewrite(loop, {look: expression("turns > 2 or look", look=look)})
         after.body.insert(0, statement("turns += 1"))
@@ -196,7 +196,7 @@ def look_for_another(program: ProgramTree, context: Context) -> Edits:
 
 
 def look_at_the_name(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that replaces a look into a room with a search in the name of the room."""
+    """Yield each edit that searches a room's name for a person or thing instead of looking into the room."""
     for loop, look in _looks_in_loops(program):
         wanted = argument(look, 0)
         if isinstance(loop, ast.For) and isinstance(loop.target, ast.Name) and wanted is not None:

@@ -69,7 +69,7 @@ def _whisker(cap: float) -> dict[str, Any]:
 
 
 def draw_task_scores(runs: Sequence[JudgedRun]) -> Figure:
-    """Draw bars of pass@1 by task and run. A second panel shows pass@1 by common sense only, if judged."""
+    """Draw bars of pass@1 by task and run. A second panel shows pass@1 on common sense only, if judged."""
     tasks = tasks_of(runs)
     judged = {score.task for run in runs for score in run.ablated_scores}
     ablated = [task for task in runs[0].suite.tasks if task in judged]

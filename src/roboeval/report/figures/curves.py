@@ -42,7 +42,7 @@ def draw_thresholds(runs: Sequence[JudgedRun]) -> Figure:
 
 
 def most_completions(runs: Sequence[JudgedRun]) -> int:
-    """Return the largest number of completions of a prompt, but at least 2, so that the axis has a length."""
+    """Return the largest number of completions of any prompt, at least 2, so that the axis has a length."""
     return max(2, *(prompt.completions for run in runs for score in run.scores for prompt in score.prompts))
 
 

@@ -100,7 +100,7 @@ def _tokens(completions: pl.DataFrame) -> tuple[int, int] | tuple[None, None]:
 
 
 def cost_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Build the table of each run's cost, in total and per passing program. It omits runs of unknown cost."""
+    """Build the table of each run's cost, in total and per passing program. Omit runs of unknown cost."""
     found = [(run.name, cost_of(run)) for run in runs]
     known = [one for one in found if one[1].input_tokens is not None or one[1].seconds is not None]
     return sheet("cost", [[name, *one] for name, one in known])

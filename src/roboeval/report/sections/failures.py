@@ -65,7 +65,7 @@ def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
 
 
 def published_notes(runs: Sequence[JudgedRun]) -> list[str]:
-    """Return notes on how far the causes of failures of these runs compare with the published ones."""
+    """Return notes on how comparable the runs' causes of failure are with those published in the paper."""
     known = [run for run in runs if paper.model_of(run) is not None]
     if not known:
         return ["None of these runs uses a model of the paper, so no published causes are shown."]

@@ -119,7 +119,7 @@ def differences_section(runs: Sequence[JudgedRun]) -> Section:
 
 
 def leader_sentences(runs: Sequence[JudgedRun]) -> list[str]:
-    """Return a list with a sentence that compares the two best runs. Empty if they cannot be compared."""
+    """Compare the two best runs in one sentence. Return [] if they cannot be compared."""
     if len(runs) == 1:
         return []
     best, second, *_ = sorted(runs, key=lambda run: -run.mean)

@@ -48,8 +48,8 @@ class FamilyTasks:
 
     Args:
         split: `train`, `validation` or `test`, which have no task in common.
-        seed: each seed, from 0, gives entirely different tasks.
-        count: the number of tasks, 1 to 100; one for each family by default.
+        seed: a number from 0; different seeds give different tasks.
+        count: the number of tasks, 1 to 100; by default one per family.
 
     Raises:
         UserError: the split does not exist, or a number is out of range.
@@ -82,7 +82,7 @@ class FamilyTasks:
 
 
 def family_tasks_named(name: str) -> FamilyTasks | None:
-    """Parse a name such as `families-test-7`; None for others. Raise UserError if a part is not valid."""
+    """Parse a name such as `families-test-7`, or return None for other names. Raise UserError if invalid."""
     match = FAMILY_SUITE_NAME.fullmatch(name)
     if match is None:
         return None

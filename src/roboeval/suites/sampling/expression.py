@@ -62,7 +62,7 @@ def parse_cached(text: str) -> ast.expr:
 
 
 def evaluate(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - strings, numbers, lists of them
-    """Compute the value of an expression, given the values of names. Raise ExpressionError if impossible."""
+    """Evaluate an expression, given the values of names. Raise ExpressionError if that is impossible."""
     try:
         return _checked_value(node, names)
     except ExpressionError:

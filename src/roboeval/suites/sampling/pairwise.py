@@ -25,14 +25,14 @@ def number_values(sizes: Mapping[str, int]) -> dict[str, range]:
 
 
 def sample_combinations(sizes: Mapping[str, int], count: int, random: Random) -> list[Combination]:
-    """Return combinations that cover all pairs of values, and random ones if these are fewer than `count`."""
+    """Return combinations that cover all pairs of values, plus random ones up to `count` in all."""
     rows = cover_pairs(sizes, random)
     rows += [{name: random.randrange(size) for name, size in sizes.items()} for _ in range(count - len(rows))]
     return rows
 
 
 def cover_pairs(sizes: Mapping[str, int], random: Random) -> list[Combination]:
-    """Return few combinations that cover every pair of values. `sizes` counts the values of each factor."""
+    """Return a small set of combinations that covers all pairs of values of the factors in `sizes`."""
     if len(sizes) == 1:
         return [{factor: value} for factor, size in sizes.items() for value in range(size)]
     numbers = number_values(sizes)

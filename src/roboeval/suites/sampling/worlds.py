@@ -38,7 +38,7 @@ class Setting:
     rooms: tuple[str, ...]  # all rooms, in the order the robot lists them
 
     def room(self, name: str) -> str:
-        """Return the room of a person or thing, or an empty string for one that is in no room."""
+        """Return the room of a person or thing, or an empty string if it is in no room."""
         room = str(self.chosen[f"{name}.in"])
         return "" if room == IN_NO_ROOM else room
 
@@ -49,7 +49,7 @@ class Setting:
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """Return a key that is equal for worlds that differ only in the answers of absent people."""
+        """Return a key to find duplicate worlds. It ignores answers of absent people: nobody can ask them."""
         absent = {_owner(factor) for factor, level in self.chosen.items() if level == IN_NO_ROOM}
         chosen = self.chosen.items()
         return self.rooms, *(one for one in chosen if one[1] == IN_NO_ROOM or _owner(one[0]) not in absent)
