@@ -199,8 +199,6 @@ class LiveRobot:
 
     def _report_failure(self, row: Skill, event: Event | None, room: str) -> None:
         """Report a failed call to the guard."""
-        if self._guard is not None:
-            self._guard.uncount_call(row)
         if event and row.recording and row.recording.judged_when_tried:
             self._report(event, room, is_drive=row.is_drive, failed=True)
 

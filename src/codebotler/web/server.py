@@ -294,5 +294,5 @@ class _Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         if self._console:
-            self._console.stop(BY_SHUTDOWN)
+            self._console.stop(BY_SHUTDOWN, holds=self._console.view.is_running)
         super().handle_exit(sig, frame)

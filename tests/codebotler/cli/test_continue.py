@@ -15,6 +15,7 @@ from codebotler.cli.operating.run import Request, run
 from codebotler.core.errors import UserError
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
+from codebotler.missions.display.view import MissionOrder
 from codebotler.missions.storage.log import EVENTS_FILE, SUMMARY_FILE
 from codebotler.missions.storage.past import MissionPast
 from codebotler.missions.storage.store import read_missions
@@ -60,6 +61,17 @@ def test_nothing_begins_after_a_stop_while_a_person_was_asked(tmp_path: Path) ->
     assert not console.stop("a person at the page", holds=True)
     with pytest.raises(UserError):
         request.order_on(console)
+
+
+def test_a_run_with_yes_is_no_approval_by_a_person(tmp_path: Path) -> None:
+    (tmp_path / "hello.py").write_text("def task_program():\n    say('hello')\n")
+    robot = Simulated(World((Room("hall"),), "hall"))
+    with Console(robot, tmp_path, lambda _: pytest.fail("no model")) as console:
+        console.stop("a person at the page", holds=True)
+        console.was_stopped = False  # in another process
+        assert run(console, Request(str(tmp_path / "hello.py"), yes=True)) == 0
+        console.begin(MissionOrder(program="def task_program():\n    say('hello')\n"))
+        assert console.is_held
 
 
 @pytest.fixture

@@ -284,6 +284,7 @@ def test_signal_stops_the_robot(folder: Path, signals: Sequence[int], status: in
     assert family
     assert are_gone(family)
     assert states(folder) == ["stopped"]
+    assert list(folder.rglob("*.held")), "a person stopped the robot, so no agent goes on by itself"
 
 
 HOMING = """
@@ -401,7 +402,7 @@ def test_home_that_cannot_be_created_is_refused(folder: Path) -> None:
     process = start(folder, *words, wrapper=["env", "CODEBOTLER_HOME=/sys/home"])
     _, err = process.communicate("", timeout=60)
     assert process.returncode == 2
-    assert re.fullmatch(r"codebotler: /sys/home/\w+: .*CODEBOTLER_HOME to another\n", err)
+    assert re.fullmatch(r"codebotler: /sys/home/\w+: .*CODEBOTLER_HOME to another folder\n", err)
 
 
 @pytest.mark.slow

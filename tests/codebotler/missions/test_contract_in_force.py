@@ -10,6 +10,8 @@ import pytest
 
 from codebotler.checking.contracts.file import contract_data
 from codebotler.core.errors import RobotError
+from codebotler.core.skills.files import skills_from
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.text.text_template import TextTemplate
 from codebotler.core.world import Room, World
 from codebotler.missions.display.view import MissionOrder, SessionView
@@ -20,7 +22,7 @@ from codebotler.models.recorded import open_recorded
 from codebotler.robots.base import Robot, RobotResult
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
-from codebotler.simulator.guard.contract import Contract, SkillBound
+from codebotler.simulator.guard.contract import Contract, RequestedCall, SkillBound
 from codebotler.simulator.guard.house_rule import UNKNOWN_ROOM
 from codebotler.simulator.worlds.room_map import RoomMap
 from doubles import FakeRobot
@@ -157,7 +159,7 @@ def test_a_call_too_many_stops_the_mission(tmp_path: Path) -> None:
     assert robot.done == ["kitchen", "mug"]
 
 
-def test_a_failed_call_is_not_counted(tmp_path: Path) -> None:
+def test_a_failed_call_is_counted(tmp_path: Path) -> None:
     failures = iter([RobotError("PickFailed", "it slipped")])
 
     def answer(skill: str, _text: str) -> RobotResult:
@@ -174,7 +176,25 @@ def task_program():
         pick("mug")
 """
     mission, _ = run(tmp_path, FakeRobot(answer), program)
-    assert mission.state is MissionState.DONE
+    assert mission.state is MissionState.STOPPED
+
+
+TOUR = """
+from codebotler import Simulation, skill
+
+@skill(names="room")
+def tour(sim: Simulation, rooms: list[str]) -> None:
+    "Drive to several rooms."
+"""
+
+
+def test_a_list_for_a_drive_is_judged_by_its_own_texts(tmp_path: Path) -> None:
+    (tmp_path / "tour.py").write_text(TOUR)
+    row = skills_from(tmp_path / "tour.py")["tour"]
+    call = RequestedCall.of(row, [("kitchen", "the cellar below the kitchen")], ["kitchen"], "hall")
+    assert call.texts == (("kitchen", "the cellar below the kitchen"),)
+    scalar = RequestedCall.of(SKILLS["go_to"], ["to the kitchen"], ["kitchen"], "hall")
+    assert scalar.texts == (("kitchen",),)
 
 
 def test_a_robot_without_a_known_position_picks_up_nothing(tmp_path: Path) -> None:

@@ -293,7 +293,7 @@ def test_only_the_program_that_was_seen_can_be_approved(console: Console) -> Non
     console.edit(HELLO.replace("hello", "bye"))
     session = console.session
     assert session is not None
-    with pytest.raises(MissionError, match=r"changed|checked"):
+    with pytest.raises(MissionError, match=r"changed|ready"):
         session.approve(seen.digest)
     wait_until(console, lambda view: view.check is not None)
     with pytest.raises(MissionError, match="changed"):

@@ -102,7 +102,7 @@ def run(console: Console, request: Request) -> int:
             print_rich(continue_view(begun))
             return 1
         try:
-            status = _carry_out(session, console.robot, request, approval)
+            status = _carry_out(session, console, request, approval)
         except KeyboardInterrupt:
             session.stop(SIGNALS[signal.SIGINT])
             raise
@@ -127,7 +127,7 @@ def run(console: Console, request: Request) -> int:
 
 
 def _carry_out(
-    session: MissionSession, robot: Robot, request: Request, approval: PriorApproval | None
+    session: MissionSession, console: Console, request: Request, approval: PriorApproval | None
 ) -> int:
     """Show a mission's program, run it if the user approves it, and return the exit status."""
     view = _prepared(session)
@@ -139,8 +139,8 @@ def _carry_out(
     else:
         past = view.past
         is_covered = approval is not None and past is not None and approval.allows(view, past)
-        if _is_approved(session, view, robot, request, is_covered=is_covered):
-            return _watched(session, view, robot, request, is_person=not is_covered)
+        if _is_approved(session, view, console.robot, request, is_covered=is_covered):
+            return _watched(session, view, console, request, is_person=not (is_covered or request.yes))
     session.join(STOP_GRACE_SECONDS)
     return 1
 
@@ -199,10 +199,10 @@ def _is_approved(
 
 
 def _watched(
-    session: MissionSession, view: SessionView, robot: Robot, request: Request, *, is_person: bool
+    session: MissionSession, view: SessionView, console: Console, request: Request, *, is_person: bool
 ) -> int:
     """Run the program, print its events, and return the exit status."""
-    with _stopped_by_signals(session) as got, EventPrinter(robot.name) as watcher:
+    with _stopped_by_signals(console) as got, EventPrinter(console.robot.name) as watcher:
         session.on_event = watcher
         with suppress(MissionError):  # the mission was stopped before it could start
             session.approve(view.digest, despite_problems=request.despite_problems, is_person=is_person)
@@ -227,15 +227,15 @@ def end_at_signals() -> None:
 
 
 @contextmanager
-def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
-    """Stop the session when a signal arrives, and yield the list of signals received so far.
+def _stopped_by_signals(console: Console) -> Iterator[list[int]]:
+    """Stop the robot and hold agents when a signal arrives, and yield the signals received so far.
 
     SIGHUP stays ignored if it already was, as with `nohup`, so that the mission outlives its terminal.
     """
     got: list[int] = []
 
     def obey(number: int, _frame: object) -> None:
-        session.stop_soon(SIGNALS[signal.Signals(number)])
+        console.stop(SIGNALS[signal.Signals(number)], holds=True)
         got.append(number)
         if len(got) > 1:
             note(f"\nasked the robot to stop; the robot has {STOP_GRACE_SECONDS:g} s to confirm")

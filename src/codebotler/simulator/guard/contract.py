@@ -46,7 +46,7 @@ class RequestedCall:
         """Create a skill call in the room `place`. For a drive, `rooms` are those that its goal may mean."""
         texts = []
         for parameter, value in zip(row.parameters, arguments, strict=True):
-            if is_goal(row, parameter.name) and rooms:
+            if is_goal(row, parameter.name) and rooms and isinstance(value, str):
                 texts.append(tuple(rooms))
             elif isinstance(value, tuple):
                 texts.append(
@@ -74,7 +74,7 @@ class SkillBound:
     Args:
         texts: for each parameter, its name and templates; each of its texts must match one of them.
         places: the rooms in which the skill may be called; None for any.
-        at_most: how many successful calls one run may make; None for any number.
+        at_most: how many calls one run may make, failed ones included; None for any number.
     """
 
     texts: tuple[tuple[str, Templates], ...] = ()
@@ -127,7 +127,7 @@ class Contract:
     def objection(self, call: RequestedCall, earlier: int = 0) -> str:
         """Return why a call is forbidden, such as "since ask may not be called", or "" if it is allowed.
 
-        `earlier` is the number of calls of this skill that have succeeded in the run so far.
+        `earlier` is the number of calls of this skill in the run so far.
         """
         bound = self.skills.get(call.skill)
         if call.skill in TELLING_SKILLS:
@@ -135,7 +135,7 @@ class Contract:
         if bound is None:
             return f"since {call.skill} may not be called"
         if bound.at_most is not None and earlier >= bound.at_most:
-            return f"since {call.skill} may succeed at most {counted(bound.at_most, 'time')}"
+            return f"since {call.skill} may be called at most {counted(bound.at_most, 'time')}"
         return bound.objection(call)
 
     def excess_over(self, other: Contract) -> Contract:

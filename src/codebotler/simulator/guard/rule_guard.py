@@ -121,7 +121,6 @@ class RuleGuard:
         try:
             result = self._execute(robot, skill, arguments)
         except RobotError:
-            self.uncount_call(row)
             events = robot.events[start:]
             is_tried = row.recording is not None and row.recording.judged_when_tried
             if attempt is not None and is_tried and all(event.kind != attempt.kind for event in events):
@@ -170,10 +169,6 @@ class RuleGuard:
             if why := contract.objection(call, self._calls[row.name]):
                 raise contract_violation(row, arguments, place, why)
         self._calls[row.name] += 1
-
-    def uncount_call(self, row: Skill) -> None:
-        """Do not count a skill's last call, since it failed. Contracts limit only successful calls."""
-        self._calls[row.name] -= 1
 
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
         """Raise RuleViolationError if a possible next event breaks a rule. If `is_drive`, all are drives."""
