@@ -478,7 +478,7 @@ def test_run_on_a_robot_that_has_acted_is_not_repeated() -> None:
             return workers.submit(lambda: workers.here().run_on(program, robot)).result()
 
         assert texts_of(run_on(SimulatedRobot(WORLD))) == ["a", "b"]
-        with pytest.raises(EngineError, match="start the command again"):
+        with pytest.raises(EngineError, match="run the command again"):
             run_on(SimulatedRobot(WORLD, skills=with_say(say_and_kill(1))))
 
 

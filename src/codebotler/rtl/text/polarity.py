@@ -51,7 +51,7 @@ _OPEN = re.compile(
 
 
 class Polarity(Enum):
-    """Whether a clause affirms a thing (`tea is there`), denies it (`no tea`) or is unsure (`maybe tea`)."""
+    """Whether a clause affirms something (`tea is there`), denies it (`no tea`) or neither (`maybe tea`)."""
 
     AFFIRMS = "affirms"
     DENIES = "denies"

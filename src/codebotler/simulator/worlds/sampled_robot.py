@@ -342,7 +342,7 @@ class SampledRobot(SimulatedRobot):
         self.explored[goal].people |= {who, SOMEBODY}
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Return a random option's position. Without a prior look, the person is here (random if strict)."""
+        """Return a random option's index. With no prior look, the person is here (random if strict)."""
         person, options = as_text(person), to_options(options)
         who = normalized(person)
         if not options or not self._answers(who):
