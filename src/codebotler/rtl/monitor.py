@@ -35,7 +35,7 @@ class Monitor:
 
     @property
     def is_final(self) -> bool | None:
-        """Whether no event can change `holds` any more. None without `events`, or if this is too complex."""
+        """Whether no further event can change `holds`; None without `events`, or if this is too complex."""
         if self._masks is None:
             return None
         possible, waiting = {self._state}, [self._state]
@@ -92,7 +92,7 @@ class _Machine:
         return found
 
     def step(self, state: Any, mask: int) -> tuple[Any, bool]:  # noqa: ANN401 - as in Machine
-        """Return the state after an event with `mask`, and whether the formula holds there. Cache both."""
+        """Look up or compute the next state for an event's `mask`, and whether the formula holds in it."""
         known = self.steps.get((state, mask))
         if known is not None:
             return known

@@ -37,7 +37,7 @@ def choices(pattern: str) -> tuple[str, ...] | None:
 
 
 def one_of(texts: tuple[str, ...]) -> str:
-    """Join alternatives: `"bread" or "toast"`. Of more than five texts, count those after the fifth."""
+    """Join alternatives: `"bread" or "toast"`. Show up to five texts, and count the rest."""
     return listed(elide_list([f'"{brief(text)}"' for text in texts]), "or")
 
 

@@ -57,7 +57,7 @@ class FormulaSource:
         return self.error(node.col_offset, f"expected {what}, found {found}{hint}")
 
     def error(self, at: ast.expr | int, problem: str) -> RtlSyntaxError:
-        """Return the error for a problem at a syntax node, or at an offset in the formula, in bytes."""
+        """Return the error for a problem `at` a syntax node, or at a byte offset in the formula."""
         if isinstance(at, ast.Attribute):
             at = (at.end_col_offset or 0) - len(at.attr.encode())
         offset = at if isinstance(at, int) else at.col_offset

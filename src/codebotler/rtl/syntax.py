@@ -125,7 +125,7 @@ class _Parser(FormulaSource):
         return formulas.Exists(wanted, (formulas.Scope("AfterLast", opposite),))
 
     def state(self, name: str, node: ast.Call) -> formulas.Formula:
-        """Parse a test such as `on("stove")`, which holds for a set if it holds for any of its names."""
+        """Parse a state test such as `on("stove")`. For a named set, any of its things may have the state."""
         (thing,) = self.arguments(node, node, name, 1)
         things = [thing]
         match thing:
@@ -133,13 +133,13 @@ class _Parser(FormulaSource):
                 names = map(_escaped, self.names_in(tag[1], thing))
                 things = [ast.copy_location(ast.Constant(each), thing) for each in names]
             case ast.Constant(str(text)) if not THING_NAME.fullmatch(text):
-                raise self.expected("a string with the name of one thing", thing)
+                raise self.expected("a string that names one thing", thing)
             case ast.Call():
-                raise self.expected("a string with the name of one thing", thing)
+                raise self.expected("a string that names one thing", thing)
         return _joined(formulas.Or, [self.is_in_state(name, each) for each in things])
 
     def is_in_state(self, name: str, thing: ast.expr) -> formulas.Formula:
-        """Return the formula that an event has set a state, and no later event has cleared it."""
+        """Return a formula that holds while a thing is in a state: set by an event, and not cleared since."""
         rows = self.recordings.items()
         setting = [self.event_of(kind, thing) for kind, row in rows if row.sets == name]
         clearing = [self.event_of(kind, thing) for kind, row in rows if row.clears == name]
@@ -277,14 +277,14 @@ class _Parser(FormulaSource):
             case ast.Call(ast.Name("words")):
                 arguments = self.arguments(node, node, "words")
                 if not arguments:
-                    raise self.error(node, "words needs at least one text")
+                    raise self.error(node, 'words needs at least one text, as in words("tea")')
                 return formulas.Words(tuple(map(self.matched, arguments)))
             case ast.Call(ast.Name(name)) if name.endswith("number"):
                 arguments = self.arguments(node, node, name)
                 if len(arguments) < 2:  # noqa: PLR2004 - the number and the thing
                     raise self.error(
                         node,
-                        f"{name} takes a number and one or more words for what is counted",
+                        f'{name} takes a number and the thing to count, as in {name}(2, "mug")',
                     )
                 number, (thing, *others) = self.number(arguments[0]), map(self.word, arguments[1:])
                 return Number(number, thing, tuple(others), name == "othernumber")
@@ -350,7 +350,7 @@ class _Parser(FormulaSource):
         found = len(call.args)
         if wanted is not None and found != wanted and name == self.question:
             hint = f'{name} takes a question and an option, as in {name}("tea", ".*")'
-            raise self.error(at, f"{hint}; mention(...) takes a string that may be in either")
+            raise self.error(at, f"{hint}; use mention(...) for a string that may be in either")
         if wanted is not None and found != wanted:
             takes = f"{wanted or 'no'} argument{'s' * (wanted > 1)}"
             raise self.error(at, f"{name} takes {takes}, not {found}")

@@ -24,7 +24,7 @@ STOPPED_BY_RULE: SkillAnswer = ("stop", True)
 
 
 class SkillPerformer(Protocol):
-    """A robot, simulated or real, that performs the skill calls of a run. A call may take any time."""
+    """A simulated or real robot that performs the skill calls of a run. Calls have no time limit."""
 
     settings: SimulationSettings
     skills: SkillTable
@@ -47,7 +47,7 @@ class SkillPerformer(Protocol):
 
 
 def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, float, bool]:
-    """Return a run's fuel (steps); its time, time limit and clock start in seconds; whether time is real."""
+    """Return fuel, seconds so far, time limit in seconds, clock start (Unix time), and if time is real."""
     settings, limits = robot.settings, robot.settings.limits
     return limits.ticks, robot.now, limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 
@@ -134,7 +134,7 @@ class Ledger:
 
 
 def judge_end(outcome: Outcome, robot: SimulatedRobot) -> Outcome:
-    """Return the outcome, or a robot error instead if the program finished but a rule is not kept."""
+    """Return the outcome, or a robot error if the program finished without satisfying every house rule."""
     unkept = robot.guard.find_first_unkept() if robot.guard is not None and outcome.error is None else None
     if unkept is None:
         return outcome
@@ -149,7 +149,7 @@ def too_long(limits: Limits) -> str:
 class RememberingLedger(Ledger):
     """Counts the calls of a simulated run, and caches the answers to calls that change nothing.
 
-    This helps programs that look a thousand times while they wait. Caching starts after UNREMEMBERED_CALLS.
+    This speeds up programs that wait by looking a thousand times. Caching starts after UNREMEMBERED_CALLS.
     """
 
     def __init__(self, robot: SimulatedRobot) -> None:

@@ -128,7 +128,7 @@ class WorkerPool:
         name: Callable[[_Key], bytes],
         then: Callable[[_Called], Any] = lambda result: result,
     ) -> Iterator[Any]:
-        """Call a function on batches of keys in pool threads. Yield results in order; see `map_batches`."""
+        """Yield a function's result for each key, computed in pool threads. `map_batches` has details."""
         return map_batches(
             lambda some: self.submit(function, some),
             keys,
@@ -203,7 +203,7 @@ def _next(queue: SimpleQueue[_Value]) -> _Value:
 
 
 class DistinctKeys(Generic[_Key]):
-    """Reads keys in advance, and returns them in batches. Of keys with equal names, it uses the first."""
+    """Reads keys in advance, and returns them in batches. Skips keys whose name has occurred before."""
 
     def __init__(self, keys: Iterable[_Key], name: Callable[[_Key], bytes]) -> None:
         self._keys, self._name = iter(keys), name

@@ -38,9 +38,9 @@ class SimulationSettings:
     Args:
         literals: `lowercase` converts a program's string literals before the run, as the paper's authors did.
         matching: how requests refer to the labels of a world; `Matching` explains the values.
-        people: the names to which people answer: any, or only their own, a word for people or an empty one.
+        people: the names to which people answer: any, or only their own, words for people and "".
         words_for_people: regexes for words that mean any person.
-        words_for_yes: regexes for a yes. If none matches an option, the only one that is not a no is a yes.
+        words_for_yes: regexes for a yes. If no option matches, the only one that does not mean no is a yes.
         words_for_no: regexes for options that mean no. An option that matches one never means yes.
         events: whether events record the words of the request, or the name of the actual room or thing.
             `as-happened` records no event for a drive to an unknown room.
@@ -68,7 +68,7 @@ def choose(
 ) -> int | None:
     """Return the position of the option that an answer refers to, or None if there is none.
 
-    A text selects the first option that contains it. For yes and no, the settings' other words count as well.
+    A text selects the first option that contains it. Yes and no also match the settings' words for them.
     Any other text means yes if the question contains it, else no. A number counts options from 1, or from the
     end if it is negative. A number out of range selects the last option, or the first if it is negative.
     """

@@ -30,8 +30,8 @@ class Worker:
     """Owns the processes that run programs, one at a time.
 
     Nearly all programs are tame: they leave nothing behind, so many of them share a process that has copies
-    of their robots. All other runs, and those that such a process cannot finish, get their own process, and
-    the engine performs their skills. Only these can import modules of the standard library.
+    of their robots. All other runs, and those that such a process cannot finish, get their own process.
+    There, the engine performs the skills, and programs can import modules of the standard library.
 
     Args:
         one_process_per_run: whether each run gets its own process, even if its program is tame.
@@ -102,7 +102,7 @@ class Worker:
     # --- several tame programs in one child
 
     def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
-        """Run the tame programs. Return outcomes by position of job and robot; run the missing ones alone."""
+        """Run the tame programs. Return outcomes by job and robot index; the caller must run missing ones."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
             return known
@@ -158,7 +158,7 @@ class Worker:
 
     @contextmanager
     def one_child(self) -> Iterator[None]:
-        """Use the same process for all batches that run in this context. All must be of one program."""
+        """Use one process for all batches in this context, which must all run the same program."""
         self._keeps_child = True
         try:
             yield
@@ -192,7 +192,7 @@ class Worker:
             try:
                 outcome = self._try(source, new_robot)
             except LostProcessError as error:
-                raise EngineError(f"an isolated process was lost twice: {error}") from None
+                raise EngineError(f"an isolated process failed, and so did the retry: {error}") from None
         _log_end(source, outcome)
         return outcome
 
@@ -202,7 +202,7 @@ class Worker:
 
         def only_robot() -> SimulatedRobot:
             if not robots:
-                raise EngineError("an isolated process was lost; start the command again")
+                raise EngineError("an isolated process failed; run the command again")
             return robots.pop()
 
         return self.run_alone(source, only_robot)

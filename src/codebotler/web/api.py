@@ -56,7 +56,7 @@ class NewProgram(_Form):
 
 
 class Approval(_Form):
-    """A person's approval of a program, given by its digest, and of the problems and rules to ignore."""
+    """A person's approval of a program, identified by its digest, with any problems and rules to ignore."""
 
     program: str = Field(description="The digest of the reviewed program.", examples=["3f5a8b0c9d21e467"])
     despite_problems: bool = False
@@ -95,7 +95,7 @@ class ContinueForm(_Form):
 
 
 class AsciiJSONResponse(JSONResponse):
-    """A JSON response in ASCII, because UTF-8 cannot encode the lone surrogates that programs may have."""
+    """A JSON response in ASCII, because UTF-8 cannot encode the lone surrogates that programs may contain."""
 
     def render(self, content: object) -> bytes:
         """Return the body of the response: JSON without spaces, in ASCII."""
@@ -103,7 +103,7 @@ class AsciiJSONResponse(JSONResponse):
 
 
 def invalid_request(_request: Request, error: Exception) -> AsciiJSONResponse:
-    """Return status 422 with the fields that are wrong, and why, but without the values sent."""
+    """Return status 422, which names the invalid fields and the reasons, but does not echo the values."""
     assert isinstance(error, RequestValidationError), "registered only for this error"
     detail = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
     return AsciiJSONResponse({"detail": detail}, HTTPStatus.UNPROCESSABLE_ENTITY)
@@ -131,13 +131,13 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
-        """Begin a mission, and prepare its program in the background. Status 409 if another one runs."""
+        """Begin a mission, and prepare its program in the background. If another runs, return status 409."""
         session = console.begin(MissionOrder(new.instruction, new.model, new.program))
         return await _begun_data(console, session)
 
     @api.post("/missions/{mission}/continue", status_code=201)
     async def continue_mission(mission: str, form: ContinueForm) -> dict[str, Any]:
-        """Begin a mission for the rest of another. A person edits its program if there is no instruction."""
+        """Begin a mission to do the rest of another. Without an instruction, a person edits the program."""
         summary, _ = await asyncio.to_thread(_read_mission, console, mission)
         past = await asyncio.to_thread(console.past_of, summary.id)
         if form.happened is not None:
@@ -147,7 +147,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.get("/missions/{mission}")
     def show(mission: str) -> dict[str, Any]:
-        """Return a mission's summary by its ID. For the current mission, return its check and more."""
+        """Return a mission's summary or, for the current mission, all details, such as its check."""
         view = console.view
         if mission in {_CURRENT, view.id}:
             return view_data(view)
@@ -200,7 +200,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/approve")
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
-        """Run the program that a person has reviewed, and no other one."""
+        """Run the program that a person has reviewed, identified by its digest."""
         session = _current_session(console, mission)
         session.approve(
             approval.program,
@@ -233,7 +233,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: NewProgram) -> dict[str, Any]:
-        """Check a program, also against the house rules, in the rooms of the current mission, if any."""
+        """Check a program against the house rules and, if there is a current mission, in its rooms."""
         return console.check(new.program, console.view.room_map, console.rules).data()
 
     @api.get("/robot", tags=["robot"])
@@ -282,7 +282,7 @@ async def _stream(console: Console, session: MissionSession, known: int) -> Asyn
 
 
 def view_data(view: SessionView) -> dict[str, Any]:
-    """Convert what viewers see of a mission, such as its program and its check, to data for JSON."""
+    """Convert the view of a mission, with its state, program and check, to data for JSON."""
     as_in_view = (
         *("id", "state", "phase", "busy", "instruction", "model", "author", "digest", "is_written"),
         *("problems", "unknown_rooms", "remarks", "reason", "line", "is_over"),

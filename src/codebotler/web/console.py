@@ -48,9 +48,9 @@ CLEANUP_SECONDS = 2.0  # the time limit for ending a mission if its program has 
 class Console:
     """Begins, changes and stops the missions of one robot, for the page, for agents and for the terminal.
 
-    Any thread may use it. Only missions connect the robot. The first of the `models` is the default. No
-    program may do more than `within`. A model writes `candidates` programs for an instruction. If a skill
-    fails, a model may write a program for the rest of the mission, `recoveries` times in a row.
+    Any thread may use it. Only missions connect the robot. The first of `models` is the default. `within`
+    limits what any program may do. A model writes `candidates` programs for each instruction. If a skill
+    fails, a model may write a program for the rest of the mission, up to `recoveries` times in a row.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Console:
         self.end()
 
     def end(self) -> None:
-        """Stop the current mission, and wait for its end: up to 11 s, or 2 s if its program has not begun."""
+        """Stop the current mission, and wait up to 11 s for its end, or 2 s if its program has not begun."""
         with self._lock:
             session, self._may_recover = self.session, None
             self._end_hold()
@@ -136,8 +136,8 @@ class Console:
     ) -> MissionSession:
         """Begin a mission, by default with the first model. Raise MissionError while another mission runs.
 
-        With `by_agent`, the notice about interrupted missions stays, so that a person still sees it. With
-        `after`, also raise MissionError if STOP was pressed or a mission began since that session.
+        With `by_agent`, keep the notice about interrupted missions, so that a person still sees it. With
+        `after`, also raise MissionError if STOP was pressed or another mission began after that session.
         """
         noticed = self.interrupted if by_agent else ()
         session = self._begin(order, after=after)
@@ -161,7 +161,7 @@ class Console:
             if before is not None and before.view.is_running:
                 raise MissionError(f"mission {before.view.id} is {before.view.state}; stop it first")
             if after is not None and after is not self._may_recover:
-                raise MissionError("somebody pressed STOP or began another mission, so nothing was begun")
+                raise MissionError("the mission did not begin because somebody pressed STOP or began another")
             if self._stopping.is_alive():
                 raise MissionError("the robot has not answered a stop request yet; check the robot")
             if before is not None and before.is_stuck:
@@ -261,7 +261,7 @@ class Console:
 
     @property
     def is_held(self) -> bool:
-        """Whether a person must approve the next mission, since STOP was pressed or the robot was lost."""
+        """Whether a person must approve the next mission, because STOP was pressed or the robot was lost."""
         return self._hold.exists
 
     def _end_hold(self) -> None:
@@ -276,10 +276,10 @@ class Console:
         self.notifier.change()
 
     def stop(self, by: str, *, only_moving: bool = False, holds: bool = False) -> bool:
-        """Ask the current mission to stop. Return at once whether there was a mission to stop.
+        """Ask the current mission to stop, without waiting. Return whether there was a mission to stop.
 
         `by` names the source for the log. A robot that was lost, or did not confirm a stop, is stopped again.
-        With `only_moving`, a mission without approval goes on, unless a robot was lost. With `holds`, a
+        With `only_moving`, spare a mission without approval, unless a robot was lost. With `holds`, a
         person must approve the next mission, even if there was nothing to stop.
         """
         with self._lock:

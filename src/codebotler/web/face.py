@@ -80,7 +80,7 @@ def router(console: Console, face: Face) -> APIRouter:
 
     @routes.websocket("/api/face/live")
     async def live(socket: WebSocket) -> None:
-        """Send the face's data now and at each change, and ignore incoming messages."""
+        """Stream what the robot says and asks: now, and after each change. Ignore incoming messages."""
         await socket.accept()
         with face.count_screen():
             sending = asyncio.create_task(_send_changes(socket, console, face))

@@ -69,7 +69,7 @@ class Frame:
 
 
 def outside(address: str) -> str:
-    """Return a path with the prefix that browsers must use, such as `/robot/missions` for `/missions`."""
+    """Add the prefix that browsers must use to a path: return `/robot/missions` for `/missions`."""
     request = ui.context.client.request
     return prefix_of(request.scope) + address
 
@@ -123,7 +123,7 @@ def warned() -> Iterator[None]:
 
 
 class Button(PlainText):
-    """A button that calls `pressed`, with the value of the JavaScript `emits` if any. It shows mistakes."""
+    """A button that calls `pressed`, with the value of the JavaScript `emits` if given, and shows errors."""
 
     def __init__(self, text: str, pressed: Callable[..., Any], kind: str = "", *, emits: str = "") -> None:
         async def press(event: GenericEventArguments) -> None:
@@ -204,7 +204,7 @@ class Pages:
 
 
 def installed_pages() -> tuple[Pages, ...]:
-    """Load the pages of installed packages. Leave out those that fail, and report them on stderr."""
+    """Load the pages of installed packages. Skip those that fail to load, and report them on stderr."""
     found: list[Pages] = []
     for point in sorted(entry_points(group=_ENTRY_POINTS), key=lambda point: point.name):
         try:

@@ -48,7 +48,7 @@ class Notifier:
                 self._wakes.remove(wake)
 
     async def until(self, is_met: Callable[[], bool], seconds: float | None = None) -> bool:
-        """Wait until a condition is met, for at most `seconds` if given. Return whether it is met."""
+        """Wait until a condition is met or, if given, `seconds` have passed. Return whether it is met."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds), aclosing(self.changes()) as changes:
                 async for _ in changes:

@@ -74,7 +74,7 @@ def serve(
     """Serve the page until Ctrl-C, which also stops the robot. Without a console, serve `further` pages only.
 
     If `alone_for` is given, the robot stops that many seconds after the last operator has closed the page.
-    When the `companion` ends, the page ends, too.
+    The page ends when the `companion` ends.
     """
     with place.listen() as bound, console or nullcontext():
         port = bound.getsockname()[1]
@@ -244,7 +244,7 @@ class _Connection(AutoHTTPProtocol):  # type: ignore[misc,valid-type]  # depends
     """
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """If more than 100 connections wait for their clients, close those that have waited longest."""
+        """If more than 100 connections are idle, close the oldest, so that new clients can connect."""
         super().connection_made(transport)
         self.since = time.monotonic()
         waiting = [one for one in self.connections if isinstance(one, _Connection) and one.is_waiting]
@@ -253,7 +253,7 @@ class _Connection(AutoHTTPProtocol):  # type: ignore[misc,valid-type]  # depends
 
     @property
     def is_waiting(self) -> bool:
-        """Whether the connection waits for its client: no complete request is being answered."""
+        """Whether the server is waiting for the client to send (the rest of) a request."""
         cycle = self.cycle
         return cycle is None or cycle.more_body or cycle.response_complete
 

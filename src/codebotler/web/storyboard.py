@@ -70,7 +70,7 @@ class Storyboard(NamedTuple):
 
 
 def draw_strips(board: Storyboard) -> None:
-    """Draw a row of rooms for each expected outcome. Tick visited rooms; fold rows that do not fit."""
+    """Draw a row of rooms for each expected outcome. Tick visited rooms; fold rows that no longer match."""
     shown = strips(board.check)
     PlainText("h3", board.title if shown else "")
     numbers = [scenes_reached(strip, board.visited, board.learned) for strip in shown]
@@ -92,7 +92,7 @@ def draw_strips(board: Storyboard) -> None:
 
 
 def scenes_reached(strip: Strip, visited: Sequence[str], learned: Sequence[Event]) -> int | None:
-    """Return how many of a strip's drives the robot has done, or None if it did or saw anything else."""
+    """Return how many of a strip's drives are done, or None if the robot did or saw something else."""
     known = [*takewhile(lambda scene: scene.room != _LEFT_OUT, strip.scenes)]
     expected = [deed.text for scene in known for deed in scene.deeds if deed.kind in {CHECK, ANSWER}]
     actual = [_phrase(one) if one.kind == CHECK else _answer_text(one.answer) for one in learned]
@@ -151,7 +151,7 @@ def _number(element: PlainText, step: int, anchor: str) -> None:
 
 
 def strips(check: CheckResult) -> list[Strip]:
-    """Return the rooms and actions of each different outcome of a check, at most 6, problems first."""
+    """Return a strip for each distinct outcome of a check: at most 6, those with problems first."""
     different: dict[tuple[tuple[Scene, ...], str], tuple[bool, Strip]] = {}
     for sample in check.samples:
         strip = _strip(sample, check)
@@ -183,7 +183,7 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
 def scenes(
     steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int | None] = frozenset()
 ) -> tuple[Scene, ...]:
-    """Group a run's steps by visits to rooms. Shorten a long run, but keep the steps numbered `needed`."""
+    """Group steps by room, beginning in `start`. Omit steps of long runs, but none numbered in `needed`."""
     found: list[Scene] = [Scene(shortened(start, _MAX_STEP_TEXT))]
     for is_shown, some in select_steps(steps, needed):
         if not is_shown:

@@ -17,7 +17,7 @@ Span = tuple[int, int]
 
 
 def uncovered_clauses(task: Task) -> Iterator[tuple[int, str]]:
-    """Yield the clauses of prompts that no check covers, each after the number of its prompt, from 0.
+    """Yield the index of a prompt and a clause in it, for each clause that no check covers.
 
     A clause is covered if a requirement quotes one of its words. It is also covered if a regex of a fact in
     `covered_by` matches one of its words, not counting words that `.*` matches.

@@ -52,7 +52,7 @@ class Finding:
 
 
 def render(findings: Iterable[Finding], *, accepted: bool = False) -> str:
-    """Format findings as lines. List the accepted ones with reasons if `accepted`, or else count them."""
+    """Format findings as lines. If `accepted`, list accepted ones with their reasons, else count them."""
     every = [*findings]
     lines = [one.rendered() for one in every if accepted or one.accepted is None]
     if hidden := len(every) - len(lines):

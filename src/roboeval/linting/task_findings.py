@@ -155,7 +155,7 @@ def _slow(task: Task) -> Iterator[Finding]:
 
 
 def searched_regexes(task: Task) -> dict[str, Requirement]:
-    """Return all regexes that are searched for to judge programs, each with the first requirement for it."""
+    """Map each regex that is used to judge programs to the first requirement that uses it."""
     found: dict[str, Requirement] = {}
     for requirement in {one.text: one for one in _required(task)}.values():
         for element in elements(requirement.formula):

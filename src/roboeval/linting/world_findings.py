@@ -25,7 +25,7 @@ from roboeval.suites.load import Requirement, Scenario, Task
 
 @dataclass(frozen=True)
 class JudgedWorld:
-    """A world of a task, or of its ablation, whose requirements are searched for mistakes."""
+    """A world of a task, or of its ablation, with methods that find mistakes in its requirements."""
 
     task: Task
     number: int  # the number of the world, from 1
@@ -53,7 +53,7 @@ class JudgedWorld:
         return Finding(kind, subject, message, self.task.path, line)
 
     def findings(self) -> Iterator[Finding]:
-        """Yield likely mistakes in the requirements of this world, without a comparison with other worlds."""
+        """Yield likely mistakes in this world's requirements that need no comparison with other worlds."""
         for requirement in self.require:
             yield from self.dead_regexes(requirement)
             for what, name in absent_names(requirement, self.scenario, self.task):

@@ -55,13 +55,13 @@ def mission_tools() -> list[dict[str, Any]]:
 
 @dataclass
 class TrainingMission:
-    """A mission for a policy, to `call` skills until it `is_over`. Equal calls have equal results.
+    """A mission in which a policy can `call` skills until it `is_over`. Equal calls have equal results.
 
     Args:
         family: the family of the task.
         seed: the seed of the task.
         prompt_index: the number of the phrasing, from 0.
-        world: the number of the world, from 0, among those with something to do; counting wraps around.
+        world: the index of the world among those with something to do; an index past the end wraps around.
 
     Raises:
         UserError: the family or prompt does not exist.
@@ -98,7 +98,7 @@ class TrainingMission:
         return result
 
     def answer(self, text: str) -> None:
-        """End the mission because the policy is done. Its last words, `text`, do not change the reward."""
+        """End the mission with the policy's final message, which does not affect the reward."""
         if not self.is_over:
             self._mission.answer(text)
 

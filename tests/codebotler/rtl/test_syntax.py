@@ -295,9 +295,9 @@ def test_state_of_a_set_holds_if_it_holds_for_any_name() -> None:
 @pytest.mark.parametrize(
     ("text", "column", "named"),
     [
-        ('on("stove|oven")', 4, "the name of one thing"),
-        ('on(words("stove"))', 4, "the name of one thing"),
-        ('on("")', 4, "the name of one thing"),
+        ('on("stove|oven")', 4, "names one thing"),
+        ('on(words("stove"))', 4, "names one thing"),
+        ('on("")', 4, "names one thing"),
         ("on()", 1, "1 argument"),
         ('onn("stove")', 1, "did you mean on?"),
         ('open("stove")', 1, "unknown state open"),

@@ -77,7 +77,7 @@ def alphabet(
 
 
 def aspects_of(element: EventPattern) -> tuple[EventPattern, ...]:
-    """Split a pattern into four: texts, answer or result, room, held object or addressee. All must match."""
+    """Split a pattern into four, one each for texts, answer or result, room, and held object or addressee."""
     kind = element.kind
     return (
         EventPattern(kind, element.text, element.options, element.mention, more=element.more),

@@ -31,7 +31,7 @@ class Automaton:
     @classmethod
     @lru_cache(maxsize=1_000)  # worlds of a task share most requirements
     def of(cls, formula: formulas.Formula, letters: tuple[Letter, ...]) -> Automaton:
-        """Build a formula's minimal automaton for events with these `letters`, or raise Undecided."""
+        """Build a formula's minimal automaton over `letters`. Raise Undecided if it needs too many states."""
         machine = machine_of(formula)
         number: dict[AutomatonState, int] = {machine.start: 0}
         rows: list[list[int]] = []

@@ -33,7 +33,7 @@ class RepeatedText(NamedTuple):
 
 @cache
 def slow_text(pattern: str) -> str | None:
-    """Return the start of a string on which a regex is slow: `aaa` for `(a+)+b`; None if none was found."""
+    """Return the start of a string on which a regex is slow: `aaa` for `(a+)+b`, or None if none is found."""
     for find, sizes in ((failing_regex(pattern), SHORT_SIZES), (compile_regex(pattern), LONG_SIZES)):
         for text in texts_to_try(pattern):
             if is_slow(find.findall, text, sizes):

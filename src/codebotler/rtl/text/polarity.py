@@ -51,7 +51,7 @@ _OPEN = re.compile(
 
 
 class Polarity(Enum):
-    """Whether a clause affirms (`tea is there`), denies (`no tea`) or leaves open (`maybe tea`)."""
+    """Whether a clause affirms something (`tea is there`), denies it (`no tea`) or neither (`maybe tea`)."""
 
     AFFIRMS = "affirms"
     DENIES = "denies"
@@ -59,7 +59,7 @@ class Polarity(Enum):
 
 
 def polarity(clause: str) -> Polarity:
-    """Return the polarity of a clause: `nobody` and `declined` deny, while questions and `maybe` are open."""
+    """Return the polarity of a clause: `nobody` and `declined` deny; questions and `maybe` do neither."""
     if clause.rstrip().endswith("?") or _OPEN.search(clause):
         return Polarity.OPEN
     return Polarity.DENIES if denies_something(clause) else Polarity.AFFIRMS

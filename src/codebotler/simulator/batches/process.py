@@ -46,7 +46,7 @@ UNDECIDED_RUN = b"null"  # replaces a transcript if the run must be repeated in 
 
 
 def main(*descriptors: str) -> None:
-    """Run a fork server for batches. Its `descriptors` are a socket and a pipe to the engine, as numbers."""
+    """Run a fork server for batches. `descriptors` are the numbers of a socket and a pipe to the engine."""
     reset_inherited_settings()
     arrange(list(map(int, descriptors)))
     door = socket(fileno=RUN_DOOR)
@@ -76,7 +76,7 @@ def transcripts(
     batch: Batch,
     send: Callable[[list[bytes]], None] = len,  # type: ignore[assignment]  # a rehearsal sends nothing
 ) -> None:
-    """Run the programs of a batch, each in all its worlds. Pass the transcripts to `send` (default: drop)."""
+    """Run a batch of programs, each in all its worlds. Pass transcripts to `send`; by default, drop them."""
     skills, elsewhere, pickled, programs = batch
     if skills != run.skills:
         run.provide(skills)
@@ -126,7 +126,7 @@ class TranscribedRun(ProgramRun):
         self.refuel()
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Execute a skill on this process's copy of the robot, or else on the engine's. Return its result."""
+        """Execute a skill on our copy of the robot, or ask the engine if only it can. Return the result."""
         given = [
             _robot_argument(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)
         ]
@@ -162,7 +162,7 @@ class TranscribedRun(ProgramRun):
         raise LimitReachedError
 
     def except_hook(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
-        """Return the function that each `except` calls. If stack or memory ran out, the run is repeated."""
+        """Return the function that each `except` calls. It requests a rerun if stack or memory ran out."""
 
         def caught() -> None:
             error = sys.exc_info()[0]
@@ -173,7 +173,7 @@ class TranscribedRun(ProgramRun):
         return caught
 
     def ended_by(self, error: BaseException) -> str:
-        """Return as JSON how the program ended. After a recursion or memory error, the run is repeated."""
+        """Return as JSON how the program ended. Request a rerun after a recursion or memory error."""
         try:
             str(error)
         except (RecursionError, MemoryError):

@@ -23,7 +23,7 @@ Programs: TypeAlias = Sequence[tuple[bytes, Sequence[SimulatedRobot]]]
 
 
 class Call(NamedTuple):
-    """A program's call of a skill, and the answer that it got from the child's copy of the robot."""
+    """A program's skill call, and the answer of the robot's copy in the child."""
 
     skill: str
     arguments: tuple[Scalar | tuple[Option | Scalar, ...], ...]
@@ -50,7 +50,7 @@ TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 def message(
     programs: Programs,
 ) -> tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
-    """Return a batch for a child: skills, names of custom skills, pickled robots, code with robot numbers."""
+    """Return a batch for a child: skills, those that the engine runs, robots, code with robot indexes."""
     robot = programs[0][1][0]
     setups: dict[tuple[int, ...], Setup] = {}
     keyed = []
@@ -104,12 +104,12 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
 def _frame(child: IsolatedProcess) -> bytes:
     frame = child.receive_bytes(MAX_FRAME)
     if frame is None:
-        raise LostProcessError("the process of a batch ended before the batch was done")
+        raise LostProcessError("the process that runs a batch exited before the batch was finished")
     return frame
 
 
 def key_of(frame: bytes, robot: SimulatedRobot) -> ReplayKey | None:
-    """Return the cache key of a robot's transcript (`frame`), or None if the outcome must not be cached."""
+    """Return the cache key of a transcript (`frame`) for this robot, or None if it must not be cached."""
     if len(frame) > MAX_REPLAY_BYTES or robot.setup[0] != "simulated" or robot.own_skills or robot.guard:
         return None
     return frame, id(robot.skills), *map(id, robot.setup[1])
@@ -120,7 +120,7 @@ def parse_transcript(frame: bytes) -> Transcript | None:
     try:
         return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # the decoder returns this type
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        raise ProtocolError("the child sent a transcript that is not valid") from None
+        raise ProtocolError("the child sent an invalid transcript") from None
 
 
 class Replay:
@@ -131,17 +131,17 @@ class Replay:
         self._own = robot.own_skills
 
     def follow(self, transcript: Transcript) -> SkillAnswer:
-        """Repeat all calls, and return the robot's last answer. Raise ProtocolError if any answer differs."""
+        """Repeat a transcript's calls. Return the last answer. Raise ProtocolError if any answer differs."""
         calls = [self._expected(call) for call in transcript.calls]
         if transcript.end is None and (not calls or calls[-1][-1] is not None):
-            raise ProtocolError("the child waits for an answer, but its transcript asks for none")
+            raise ProtocolError("the child's transcript has neither an end nor an unanswered call")
         ledger = self.ledger
         answer: SkillAnswer = ("ok", None)
         for skill, arguments, now, expected in calls:
             if now != self.robot.now:
                 self._let_time_pass(now)
             if ledger.limit is not None:
-                raise ProtocolError("a transcript contains more skill calls after the run reached a limit")
+                raise ProtocolError("the child's transcript has skill calls after the run reached a limit")
             answer = ledger.perform(skill, arguments)
             if ledger.broken is not None:
                 return answer
@@ -155,7 +155,7 @@ class Replay:
 
     def _let_time_pass(self, now: float) -> None:
         if now < self.robot.now:
-            raise ProtocolError("the clock of a transcript goes backwards")
+            raise ProtocolError("the child's transcript has a time that is earlier than the one before it")
         if self.ledger.limit is None:
             self.ledger.let_time_pass(now)
 

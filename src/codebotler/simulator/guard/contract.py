@@ -72,7 +72,7 @@ class SkillBound:
     """The limits within which a program may call one skill.
 
     Args:
-        texts: for each parameter, its name and templates; each of its texts must match one of them.
+        texts: for each parameter, its name and templates; a text is allowed if it matches one of them.
         places: the rooms in which the skill may be called; None for any.
         at_most: how many calls one run may make, failed ones included; None for any number.
     """
@@ -82,7 +82,7 @@ class SkillBound:
     at_most: int | None = None
 
     def objection(self, call: RequestedCall) -> str:
-        """Return why a call is forbidden: `since its obj may be "mug", and not "pen"`; or "" if allowed."""
+        """Return why a call is forbidden (`since its obj may be "mug", and not "pen"`), or "" if allowed."""
         for (name, allowed), texts in zip(self.texts, call.texts, strict=True):
             for text in texts:
                 if not any(template.matches(text) for template in allowed):
@@ -139,7 +139,7 @@ class Contract:
         return bound.objection(call)
 
     def excess_over(self, other: Contract) -> Contract:
-        """Return a contract with only what this one allows and the other one forbids."""
+        """Return the part of this contract that the other contract forbids, as a contract."""
         new = {
             name: bound if name not in other.skills else bound.excess_over(other.skills[name])
             for name, bound in self.skills.items()

@@ -59,11 +59,11 @@ class Rule:
         return any(one.kind == GOTO and one.text != Regex(".*") for one in self.elements)
 
     def depends_on_room(self, event: Event) -> bool:
-        """Return whether it matters to the rule in which room an event of this kind happens."""
+        """Return whether the rule depends on the room in which an event of this kind happens."""
         return any(one.place is not None for one in self.elements if one.kind == event.kind)
 
     def results(self, attempt: Event) -> Sequence[Event]:
-        """Return the event with each possible result, or unchanged if the rule compares no results."""
+        """Return one copy of the event per possible result, or just the event if the rule ignores results."""
         compared = [one for one in self.elements if one.kind == attempt.kind]
         if any(one.found is not None for one in compared):
             return [replace(attempt, found=True), replace(attempt, found=False)]
@@ -78,7 +78,7 @@ class RuleViolationError(RobotError):
     Args:
         rule: the rule in question.
         event: the event that breaks the rule, or None if the rule is broken at the end of a mission.
-        objection: the verb between rule and event: the rule forbids, cannot judge or is broken by the event.
+        objection: the verb that links rule and event: `forbids`, `cannot judge` or `is broken by`.
         why: the reason why the rule cannot be judged, as the end of a sentence: "since ...".
     """
 

@@ -27,18 +27,18 @@ KINDS_OF_MOVES = {PICK, PLACE}
 
 
 def name_of(label: str, request: str) -> str:
-    """Return the name that rules compare: the world's label or, if the label is a regex, the request."""
+    """Return the name to check against rules: the label in the world or, if it is a regex, the request."""
     is_name = PLAIN_LABEL.fullmatch(label) or not request or label.casefold() in request.casefold()
     return label if is_name else request
 
 
 def rooms_meant(robot: SimulatedRobot, request: str) -> list[str]:
-    """Return all rooms to which a drive with this request may lead, by the names that rules use."""
+    """Return all rooms to which a drive with this request may lead, under their names in rules."""
     return [name_of(robot.full_names.get(room, room), request) for room in robot.possible_rooms(request)]
 
 
 def goals_of_call(robot: SimulatedRobot, row: Skill, arguments: Sequence[Argument]) -> list[str]:
-    """Return the rooms to which a call may drive, by the names that rules use; empty if it is no drive."""
+    """Return the rooms to which a call may drive, under their names in rules; empty if it is not a drive."""
     goals = (
         one for parameter, one in zip(row.parameters, arguments, strict=True) if is_goal(row, parameter.name)
     )
@@ -67,7 +67,7 @@ class RuleGuard:
     Args:
         rules: the rules in force.
         room_map: the known rooms and their footprints, and what happened before the program began.
-        contracts: limits of what the program may do. Each call must keep all of them.
+        contracts: limits on what the program may do. Each call must respect all of them.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class RuleGuard:
             self.add_event(named)
 
     def perform(self, robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Let a robot execute one skill. Raise RuleViolationError if it would break, or broke, a rule."""
+        """Let a robot execute one skill. Raise RuleViolationError if the call or its result breaks a rule."""
         row, start = robot.skills[skill], len(robot.events)
         holding = "" if robot.held is None else self._history.holding or robot.held
         place = self._history.names.get(robot.place, robot.place)
@@ -171,13 +171,13 @@ class RuleGuard:
         self._calls[row.name] += 1
 
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
-        """Raise RuleViolationError if a possible next event breaks a rule. If `is_drive`, all are drives."""
+        """Raise RuleViolationError if a possible next event (a drive if `is_drive`) would break a rule."""
         found = list(self.find_violations(attempts, is_drive=is_drive))
         if found:
             raise min(found, key=lambda broken: not broken.ends_run)  # another rule may end the run
 
     def find_violations(self, attempts: Sequence[Event], *, is_drive: bool) -> Iterator[RuleViolationError]:
-        """Yield an error for each rule that a possible next event breaks. If `is_drive`, all are drives."""
+        """Yield an error for each rule that a possible next event (a drive if `is_drive`) would break."""
         attempts = tuple(map(_trimmed, attempts))
         leaves = is_drive and any(map(self._leaves, attempts[1:] or attempts))
         for rule, monitor in self._history.monitors:
@@ -227,7 +227,7 @@ class RuleGuard:
                 self.judge_result(event)
 
     def give_up(self, rules: Iterable[Rule], event: Event) -> None:
-        """Stop judging these rules, as the room is unknown. Raise an error for the first `always` rule."""
+        """Stop judging these rules, since the event's room is unknown. Raise an error if one is `always`."""
         for rule in rules:
             self._history.unjudged.add(rule.name)
             if rule.when == "always":

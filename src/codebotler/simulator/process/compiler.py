@@ -59,7 +59,7 @@ def compile_programs(
 
 
 def result_of(kind: str, text: str, further: Any) -> CompiledProgram | Outcome:  # noqa: ANN401 - from JSON
-    """Convert a result of `compile_here` to a compiled program, or an error to the outcome of all runs."""
+    """Convert a result of `compile_here`: code to a CompiledProgram, an error to the outcome of every run."""
     if kind == CODE:
         return CompiledProgram(b64decode(text), further)
     return Outcome(Status.PYTHON_ERROR, (), RunError(kind, text), further)

@@ -23,7 +23,7 @@ class ProtocolError(Exception):
 
 
 def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, RunError]:
-    """Return why a process died. `status` is its exit status or minus a signal, `seconds` its time limit."""
+    """Return why a process died. `status` is its exit status or negative signal, `seconds` its CPU limit."""
     match -status:
         case signal.SIGXCPU:
             return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")

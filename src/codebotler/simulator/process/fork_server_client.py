@@ -55,7 +55,7 @@ class ForkServer:
             self._set_up()
         except (LostProcessError, OSError):
             self.close()
-            raise LostProcessError("the fork server did not start; the machine may lack memory") from None
+            raise LostProcessError("the fork server did not start; memory may have run out") from None
         except BaseException:  # such as an interrupt
             self.close()
             raise
@@ -71,7 +71,7 @@ class ForkServer:
                 socket.send_fds(self._door, [LIVE_RUN if is_live else SIMULATED_RUN], [theirs.fileno()])
         except OSError:
             ours.close()
-            raise LostProcessError("the fork server has ended; the machine may lack memory") from None
+            raise LostProcessError("the fork server has ended; memory may have run out") from None
         return IsolatedProcess(self._pid_of_child, ours, self._end_of_child)
 
     @property
@@ -114,7 +114,7 @@ class ForkServer:
     def _read_report(self) -> int:
         data = self._report.read(REPORT_BYTES)
         if not data:
-            raise LostProcessError("the fork server has ended; the machine may lack memory")
+            raise LostProcessError("the fork server has ended; memory may have run out")
         return int.from_bytes(data, sys.byteorder, signed=True)
 
 

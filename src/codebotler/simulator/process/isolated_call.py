@@ -74,7 +74,7 @@ class IsolatedFunction(Generic[_Arguments, _Result]):
                 return self._call(ClosedProcess(self.__module__), call)
             return self._call(ClosedProcess(self.__module__), call)
         except (LostProcessError, OSError) as error:
-            raise EngineError(f"an isolated process was lost twice: {error}") from None
+            raise EngineError(f"an isolated process failed, and so did the retry: {error}") from None
 
     def _call(self, process: ClosedProcess, call: tuple[str, bytes]) -> _Result:
         try:
@@ -107,7 +107,7 @@ class ClosedProcess:
         self._channel = IsolatedProcess(lambda: self._process.pid, ours, self._process.wait)
         if self._channel.receive_bytes(len(RESULT)) != RESULT:
             self.end()
-            raise LostProcessError("the process did not start; the machine may lack memory")
+            raise LostProcessError("the process did not start; memory may have run out")
 
     def call(self, name: str, arguments: bytes) -> Any:  # noqa: ANN401 - a function may return any type
         """Call a function in the process, and return its result. `arguments` are pickled (args, kwargs)."""
@@ -122,7 +122,7 @@ class ClosedProcess:
         if not answer:
             status = self._channel.end_gently()
             if status == -signal.SIGKILL:
-                raise LostProcessError("the process was killed from outside; the machine may lack memory")
+                raise LostProcessError("the process was killed from outside; memory may have run out")
             _, fault = cause_of_death(status)
             raise IsolatedCallError(fault.kind, fault.message)
         data = json.loads(answer[1:])

@@ -49,7 +49,7 @@ class IsolatedProcess:
             raise
 
     def send(self, message: object) -> None:
-        """Send a message. If the process has ended, nothing happens; only `receive` reports that."""
+        """Send a message. Do nothing if the process has ended; the next `receive` reports that."""
         data = marshal.dumps(message, WITHOUT_REFERENCES)  # type: ignore[arg-type]  # strings, numbers and containers of them
         rest = memoryview(len(data).to_bytes(HEADER, "big") + data)
         used: int | None = None
@@ -80,7 +80,7 @@ class IsolatedProcess:
         return message
 
     def receive_bytes(self, most: int) -> bytes | None:
-        """Return the next message, or None if the process hung up. Raise ProtocolError above `most` bytes."""
+        """Return the next message, or None at the end. Raise ProtocolError if it exceeds `most` bytes."""
         used: int | None = None
         while True:
             if len(self._buffer) >= HEADER:
@@ -131,7 +131,7 @@ class IsolatedProcess:
             self.close_channel()
 
     def end_gently(self) -> int:
-        """Give the process 0.1 seconds to exit, then kill it. Return its exit status or minus its signal."""
+        """Give the process 0.1 s to exit, then kill it. Return its exit status or negative signal number."""
         for _ in range(50):
             if _stat(self.pid)[:1] in ([], ["Z"]):
                 break
@@ -139,7 +139,7 @@ class IsolatedProcess:
         return self.end()
 
     def restart_wait(self) -> None:
-        """Reset the time left to wait for the process to PROCESS_WAIT_SECONDS, since it has answered."""
+        """Restart the timeout for the process (PROCESS_WAIT_SECONDS), because it has answered."""
         self.wait_left = PROCESS_WAIT_SECONDS
 
     def close_channel(self) -> None:

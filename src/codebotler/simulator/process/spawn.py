@@ -111,7 +111,7 @@ def _written_file() -> IO[bytes]:
 
 
 def compiled_modules(compiler: Callable[[str, str], bytes]) -> bytes:
-    """Compile all modules of a fork server to a marshalled dict by name. `compiler` works as `code_of`."""
+    """Compile all modules of a fork server to a marshalled dict by name. `compiler` is like `code_of`."""
     package = f"{SIMULATOR}.sandbox"
     files = {package: str(SANDBOX / "__init__.py")}
     files |= {f"{package}.{path.stem}": str(path) for path in sorted(SANDBOX.glob("[a-z]*.py"))}

@@ -23,7 +23,7 @@ TOO_LONG_REQUEST = '["too-long",[],0.0]'
 
 
 def send(text: str) -> None:
-    """Send one message of JSON in ASCII. If it is too long, send a request that ends the run instead."""
+    """Send one JSON message in ASCII. If it is too long, send a request to end the run instead."""
     if len(text) > MAX_FRAME:
         text = TOO_LONG_REQUEST
     send_frames([text.encode("ascii")])

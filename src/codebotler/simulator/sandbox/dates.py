@@ -7,7 +7,7 @@ import time
 
 
 class StandIn(type):
-    """Metaclass of the two replacements. Objects of the original class count as instances of them."""
+    """Metaclass of the simulated `date` and `datetime`, whose instances include objects of the originals."""
 
     def __instancecheck__(cls, thing: object) -> bool:
         if cls in (date, datetime):

@@ -100,7 +100,7 @@ class Lock:
         self._is_held = False
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:  # noqa: FBT001, FBT002 - as in _thread
-        """Take the lock if it is free. Else wait and return False; a wait without `timeout` ends the run."""
+        """Take the lock if it is free, else wait and return False. A wait without `timeout` ends the run."""
         if not blocking and timeout != -1:
             raise ValueError("can't specify a timeout for a non-blocking call")
         if not self._is_held:

@@ -237,7 +237,7 @@ class ProgramRun:
 
 
 def call_task() -> object:
-    """Call the program's `task_program`. Only this function's code is used, with the program's names."""
+    """Call `task_program`. This function's code object is run with the program's global names."""
     return task_program()  # type: ignore[name-defined] # noqa: F821 - defined by the program
 
 

@@ -119,7 +119,7 @@ def _end_of(pid: int) -> int:
 
 
 def isolate(descriptor: int, seccomp: Filter | None, seconds: int, parent: bytes) -> None:
-    """Isolate this child of the process `parent`: keep only a socket open, limit its time, use seccomp."""
+    """Isolate this child of the process `parent`: keep only a socket open, limit its time, apply seccomp."""
     os.dup2(descriptor, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     die_with_parent()

@@ -28,7 +28,7 @@ def give_up_rights(memory: int = MEMORY) -> None:
 
 
 def enclose(seccomp: Filter | None, seconds: int) -> None:
-    """Forbid new processes and files, limit processor time, use `seccomp`. Call `give_up_rights` first."""
+    """Forbid new processes and files, limit processor time, apply `seccomp`. Call `give_up_rights` first."""
     set_limit("NPROC", 0)
     set_limit("NOFILE", CHANNEL + 1)
     limit_time(seconds)

@@ -19,7 +19,7 @@ ADDR_NO_RANDOMIZE = 0x0040000
 
 
 def main(descriptors: list[str]) -> None:
-    """Restart Python with these descriptors. After the restart, without arguments, run the fork server."""
+    """Restart Python with these descriptors or, after the restart (no descriptors), run the fork server."""
     if descriptors:
         start_again(list(map(int, descriptors)))
     sys.pycache_prefix = os.devnull  # a bytecode file that may or may not exist would move the heap

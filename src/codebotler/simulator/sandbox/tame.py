@@ -82,7 +82,7 @@ def parameters_of(given: ast.arguments) -> list[str]:
 
 
 def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
-    """Return whether a program may share a process with others. `nodes` are its tree's nodes by type."""
+    """Return whether a program may share a process with others. `nodes` holds the tree's nodes by type."""
     try:
         ProgramVerifier(nodes, skills).check(*tree.body)
     except (WildError, RecursionError):

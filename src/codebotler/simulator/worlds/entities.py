@@ -63,7 +63,7 @@ class Somebody:
         return Entity(self.person.name, self.traits)
 
     def answer(self, question: str, settings: SimulationSettings) -> Answer | None:
-        """Return the answer on the question's topic, or else the next answer; None if there is none."""
+        """Return the person's answer for the question's topic or, by default, their next answer, if any."""
         for topic, answer in self.person.topics:
             if finds(question, topic, settings.matching):
                 return answer

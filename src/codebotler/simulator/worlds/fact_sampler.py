@@ -17,8 +17,8 @@ class FactSampler:
     Args:
         seed: a number that determines all results together with `sample`.
         sample: the number of this world among the worlds with the same seed.
-        strict: whether facts that the program takes for granted are random as well; if not, they are true.
-        lucky: whether seven of eight choices are good: things and people are there, and people agree.
+        strict: whether facts that the program takes for granted are random; by default, they are true.
+        lucky: whether seven in eight results are favourable: things and people are there, and people agree.
         forced: facts with given results, which are not chosen at random.
         by_options: whether an answer depends on the room and the options, and not on the question.
         draws_people: whether the presence of a person is random even if the program takes it for granted.
@@ -76,7 +76,7 @@ class Draw:
 
     @property
     def alternatives(self) -> list[Draw]:
-        """Copies of this fact, one for each other result that it could have had."""
+        """Copies of this fact, one per other possible result."""
         results = (True, False) if self.method == "is_there" else range(self.arguments[0])
         return [replace(self, result=result) for result in results if result != self.result]
 

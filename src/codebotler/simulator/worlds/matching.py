@@ -42,7 +42,7 @@ def is_in_request(label: str, request: str) -> bool:
 
 
 def finds(request: str, label: str, matching: Matching) -> bool:
-    """Return whether a label (a regex) equals a request or matches in it, as the suite's `matching` says."""
+    """Return whether a label (a regex) equals a request or matches in it, under the suite's `matching`."""
     pattern = label if matching == "label-in-request" else whole_words(label)
     return is_in_request(pattern, request) or request.lower() == label.lower()
 

@@ -25,7 +25,7 @@ Setup: TypeAlias = tuple[str, tuple[Any, ...]]  # `simulated` or `sampled`, and 
 
 
 class SkillGuard(Protocol):
-    """Decides about each skill call before a robot executes it, as `RuleGuard` does."""
+    """Allows or forbids each skill call before a robot executes it; `RuleGuard` implements this."""
 
     may_refuse: bool
 
@@ -33,7 +33,7 @@ class SkillGuard(Protocol):
         """Let a robot execute one skill, or raise RobotError if it is forbidden."""
 
     def judge_inside(self, robot: SimulatedRobot, event: Event) -> None:
-        """Raise RobotError if a house rule forbids an event that happens inside a skill of the user."""
+        """Raise RobotError if a house rule forbids the next event inside a custom skill."""
 
     def find_first_unkept(self) -> RobotError | None:
         """Return an error for the first rule that would be broken if the run ended now, or None."""
@@ -72,7 +72,7 @@ class SimulatedRobot(SimulatedWorld):
 
     @property
     def own_skills(self) -> tuple[str, ...]:
-        """The names of skills that a copy of this robot in a child process lacks, such as the user's own."""
+        """The names of skills, such as custom ones, that a copy of this robot in a child cannot execute."""
         if "is_copied" not in vars(type(self)):
             return tuple(self.skills)
         if self.skills is SKILLS:
@@ -119,7 +119,7 @@ class SimulatedRobot(SimulatedWorld):
         self.room = room
 
     def look(self, entity: str) -> bool:
-        """Return whether an object or a person is in this room. Some people come only after several looks."""
+        """Return whether an object or person is in this room. Some people arrive only after several looks."""
         settings, people = self.settings, self.people_here
         seen = any(thing.is_meant_by(entity, settings.matching) for thing in self.things_here)
         seen = seen or any(one.is_here and one.is_meant_by(entity, settings) for one in people)
@@ -166,7 +166,7 @@ class SimulatedRobot(SimulatedWorld):
         self.held, self.taken = obj, thing
 
     def put(self, obj: str) -> None:
-        """Put down the held object. `obj` must be the name used to pick it up (`as-happened`: must fit)."""
+        """Put down the held object, named as in `take` (or by any fitting name with `as-happened` events)."""
         taken = self.taken if self.settings.events == "as-happened" else None
         is_meant = taken is not None and taken.is_meant_by(obj, self.settings.matching)
         if self.held is None or (self.held != obj and not is_meant):
@@ -185,7 +185,7 @@ class SimulatedRobot(SimulatedWorld):
         return {}
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Return the result of a skill that has no code: the world's value, or else a random one."""
+        """Return the result of a skill without code: the value that the world sets, or else a random one."""
         row, call = self.skills[skill], written_call(skill, plain(arguments))
         known, kinds = self._truths.get(call.casefold()), [kind for kind, _ in row.fails]
         if known in kinds:

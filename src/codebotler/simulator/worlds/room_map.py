@@ -14,7 +14,7 @@ from codebotler.simulator.worlds.matching import goals_meant
 
 @dataclass(frozen=True)
 class RoomMap:
-    """What is known of a world before random facts are chosen: rooms, names, properties and past events.
+    """What is known about a world before random facts are chosen: rooms, names, properties, past events.
 
     Args:
         rooms: the names of the rooms, in the order in which the robot lists them.
@@ -82,7 +82,7 @@ class RoomMap:
         return goals_meant(request, self.goals, dict(self.places), plain=self.guessed or self.plain)
 
     def full_name(self, room: str) -> str:
-        """Return the name that rules compare: "hall" for a room, "desk in office" for a place."""
+        """Return a room's or place's name as used in rules, such as "hall" or "desk in office"."""
         within = dict(self.places).get(room)
         return f"{room} in {within}" if within else room
 
@@ -93,7 +93,7 @@ class RoomMap:
 
     @property
     def described(self) -> list[str]:
-        """The rooms as a model reads them, such as "office (with desk and shelf)"."""
+        """The rooms as described to a model, such as "office (with desk and shelf)"."""
         places = {room: [place for place, within in self.places if within == room] for room in self.rooms}
         return [f"{room} (with {listed(within)})" if within else room for room, within in places.items()]
 

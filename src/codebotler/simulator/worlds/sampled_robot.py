@@ -109,7 +109,7 @@ class SampledRobot(SimulatedRobot):
         return self.explored[self.room]
 
     def search(self, name: str) -> RoomSearch:
-        """Return where the program looked for a name. Looks for "red mug" count for "mug", and vice versa."""
+        """Return the rooms searched for a name. Searches for "red mug" count for "mug", and vice versa."""
         combined = RoomSearch()
         for sought, search in self.searches.items():
             is_part = contains(name, sought) or contains(sought, name)
@@ -193,7 +193,7 @@ class SampledRobot(SimulatedRobot):
         return False if is_missed else None
 
     def settle(self, name: str, room: str, *, is_random: bool) -> bool:
-        """Decide whether a person or thing is in a room, at random or else with True. Return the result."""
+        """Decide, record and return whether a person or thing is in a room (True unless `is_random`)."""
         is_there = True
         if is_random:
             is_there = bool(self._draw("is_there", room, name))
@@ -208,7 +208,7 @@ class SampledRobot(SimulatedRobot):
         return self.draws[-1].result
 
     def answer(self, options: Sequence[str], *question: str) -> str:
-        """Return a random option as a question's answer. `question` consists of its room, person and text."""
+        """Choose a random option to answer a question. `question` consists of its room, person and text."""
         if self.sampler.by_options:
             given = {option.strip().casefold(): option for option in options}
             options, name = [given[text] for text in sorted(given)], (question[0], *sorted(given))
@@ -219,7 +219,7 @@ class SampledRobot(SimulatedRobot):
         return options[self._draw("answer", len(options), agreeing, *question)]
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], errors: Sequence[str] = ()) -> int:
-        """Choose a statement's outcome once, by chance. Return its position in `outcomes` + `errors`."""
+        """Choose a statement's outcome at random on first use. Return its position in `outcomes + errors`."""
         possible = [*outcomes, *errors]
         if statement not in self.outcomes:
             drawn = self.outcomes[statement] = self._draw("outcome", len(possible), statement)
@@ -280,11 +280,11 @@ class SampledRobot(SimulatedRobot):
         return [] if means_anybody(entity) or meant_by(entity, known, plain=True) else fitting
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return the things in the room `where` (or anywhere) that fit `is_`. Which are there is random."""
+        """Return things in the room `where` (default: anywhere) that fit `is_`, at random."""
         return self._all_of(self.room_map.things, where, is_ or "thing", is_person=False)
 
     def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:
-        """Return the people in the room `where` (or anywhere) who fit `is_` and all traits (by chance)."""
+        """Return people in the room `where` (default: anywhere) who fit `is_` and all `traits`, at random."""
         wanted = " ".join(str(one) for one in (is_, *traits.values()) if one) or SOMEBODY
         return self._all_of(self.room_map.people, where, wanted, is_person=True)
 
@@ -330,7 +330,7 @@ class SampledRobot(SimulatedRobot):
         return [entity.label for entity in entities if best_fits(wanted, [entity], words)]
 
     def move_person(self, name: str, room: str) -> None:
-        """Move a person to a room, or to the room around a place. The person is then in no other room."""
+        """Move a person to a room or, given a place, to its room, and out of every other room."""
         goal, who = self._room_around(self.goal_of(room)), normalized(name)
         for place, explored in self.explored.items():
             things = self.contents[place]
@@ -342,7 +342,7 @@ class SampledRobot(SimulatedRobot):
         self.explored[goal].people |= {who, SOMEBODY}
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Return a random option's position. A person not looked for is here (if strict, only by chance)."""
+        """Return a random option's index. With no prior look, the person is here (random if strict)."""
         person, options = as_text(person), to_options(options)
         who = normalized(person)
         if not options or not self._answers(who):
@@ -373,7 +373,7 @@ class SampledRobot(SimulatedRobot):
         return is_there
 
     def take(self, obj: str) -> None:
-        """Pick up an object. An object not looked for is here (in strict worlds, only by chance)."""
+        """Pick up an object. With no prior look, assume that it is here (random in strict worlds)."""
         name = normalized(obj)
         if self.held is None and self.is_here(name) is None and self._lies_there(name):
             self._add(name, self.room)
@@ -391,7 +391,7 @@ class SampledRobot(SimulatedRobot):
         return self.settle(name, self.room, is_random=self.sampler.strict)
 
     def put(self, obj: str) -> None:
-        """Put down the held object. Excuse the program if it searched for the object in vain."""
+        """Put down the held object. Excuse a failure if a search for the object found it nowhere."""
         with self.excuse_errors(is_excusable=self.held is None and self.search(normalized(obj)).is_lost):
             super().put(obj)
 

@@ -69,7 +69,7 @@ class SimulatedWorld:
 
     @cached_property
     def occupants(self) -> dict[str, list[Somebody]]:
-        """The people in each room and place, by the name of the place, including those who arrive later."""
+        """The people in each room and place, by the name of the place, including people who arrive later."""
         rooms, words = self.world.rooms, self._trait_words
         return {r.name: [Somebody(one, words.get(one.name, NO_WORDS)) for one in r.people] for r in rooms}
 
@@ -101,7 +101,7 @@ class SimulatedWorld:
         return next((room.within for room in self.world.rooms if room.name == goal), "") or goal
 
     def possible_rooms(self, request: str) -> Sequence[str]:
-        """Return all rooms that a request may mean. Even a room's exact name may mean another room too."""
+        """Return all rooms that a request may mean. Labels are regexes, so even an exact name may fit two."""
         if self.settings.matching == "longest-name":
             around = {room.name: room.within for room in self.world.rooms if room.within}
             return goals_meant(request, self.goals, around)
@@ -144,13 +144,13 @@ class SimulatedWorld:
         return {statement.casefold(): value for statement, value in self.world.truths}
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return the names of the things in the room `where` (or anywhere) that fit the description `is_`."""
+        """Return names of things in the room `where` (default: anywhere) that fit the description `is_`."""
         found = [thing for goal in self._goals_in(where) for thing in self.contents[goal]]
         fitting = (one for one in found if not is_ or best_fits(is_, [one.entity], WORDS_FOR_THINGS))
         return [thing.label for thing in fitting]
 
     def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:
-        """Return the names of the people in the room `where` (or anywhere) who fit `is_` and all traits."""
+        """Return names of people in the room `where` (default: anywhere) who fit `is_` and all `traits`."""
         around = self._room_around(self.goal_of(where)) if where else ""
         found = [one for goal in self._goals_in(around) for one in self.occupants[goal] if one.is_here]
         wanted = [str(one) for one in (is_, *traits.values()) if one]
@@ -165,7 +165,7 @@ class SimulatedWorld:
         return self._reach.get(goal, (goal,))  # on a guessed map, there are more rooms
 
     def goal_of(self, request: str) -> str:
-        """Return the room or place that a request means. Raise RobotError if that is unknown or unclear."""
+        """Return the room or place that a request means. Raise RobotError if it is unknown or ambiguous."""
         room = self.room_for(request)
         if room is None:
             raise unknown_room(request, self.possible_rooms(request))
@@ -176,7 +176,7 @@ class SimulatedWorld:
         return dict(dict(self.world.traits).get(name, ()))
 
     def move_person(self, name: str, room: str) -> None:
-        """Move the person who fits `name` to a room or place. Raise RobotError if not exactly one fits."""
+        """Move the person who fits `name` to a room or place. Raise RobotError unless exactly one fits."""
         goal = self.goal_of(room)
         everybody = [one for goal in self.goals for one in self.occupants[goal] if one.is_here]
         words = self.settings.words_for_people or WORDS_FOR_PEOPLE
@@ -214,7 +214,7 @@ class SimulatedWorld:
         return plain_names(labels)
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
-        """Return the position of a random outcome of a statement. It is always the same in the same world."""
+        """Choose a statement's outcome at random, always the same in a given world. Return its position."""
         return self._sampler.draw(len(outcomes), statement)
 
     @cached_property

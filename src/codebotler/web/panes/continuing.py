@@ -25,7 +25,7 @@ EARLY_ENDS = frozenset({MissionState.FAILED, MissionState.STOPPED, MissionState.
 
 
 class ContinueButton(Button):
-    """A button to continue a mission that ended early. It first asks about a step that may have happened.
+    """A button to continue a mission that ended early. It first asks whether an unsure step happened.
 
     `model` returns the name of the model that writes the rest, or "" for the mission's own model.
     """
@@ -62,7 +62,7 @@ class ContinueButton(Button):
         def answer(*, happened: bool, answer: str = "") -> None:
             dialog.close()
             if self._console.session is not before:
-                raise MissionError("another mission has begun since you were asked; nothing was continued")
+                raise MissionError("another mission began in the meantime, so this one was not continued")
             self._begin(past.resolve(happened=happened, answer=answer))
 
         with ui.dialog() as dialog, ui.card().classes("pane"):

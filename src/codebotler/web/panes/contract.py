@@ -12,7 +12,7 @@ from codebotler.web.frame import PlainText
 
 
 def draw_contract(skills: SkillTable, contracts: tuple[Contract, Contract | None]) -> None:
-    """Draw the current contract (the first) and what is new since the previous draft's, if it had one."""
+    """Draw the first contract and, if there is a second (the previous draft's), what the first one adds."""
     contract, earlier = contracts
     PlainText("h3", "What it may do at most")
     sentence = contract_sentence(contract, skills)

@@ -44,7 +44,7 @@ class _Folded:
             self._text = PlainText("div", "", "text").props("tabindex=0")
 
     def show_text(self, text: str, *, is_arriving: bool = False) -> None:
-        """Show a text, or hide the element if the text is empty. Of a long arriving text, show the end."""
+        """Show a text, or hide the element if it is empty. Cut a long text: at the start if `is_arriving`."""
         self._box.set_visibility(bool(text.strip()))
         if len(text) > _MAX_CHARACTERS:
             text = f"… {text[-_MAX_CHARACTERS:]}" if is_arriving else f"{text[:_MAX_CHARACTERS]} …"

@@ -47,7 +47,7 @@ class Role(StrEnum):
 
 
 class TooManyTriesError(Exception):
-    """Raised if an address sends too many invalid tokens. For up to a minute, valid ones fail, too."""
+    """Raised if an address has sent too many invalid tokens. The address must wait for up to a minute."""
 
 
 def new_token() -> str:
@@ -77,7 +77,7 @@ class Access:
         open_to_all: bool = False,
         is_private: bool = True,
     ) -> Access:
-        """Create an Access with the given tokens (random for None). Raise UserError if that is unsafe."""
+        """Create an Access with these tokens, or random ones for None. Raise UserError if that is unsafe."""
         options = {Role.OPERATOR: operator, Role.FACE: face, Role.AGENT: agent}
         given = [token for token in options.values() if token is not None]
         if open_to_all and (any(given) or not is_private):
@@ -91,7 +91,7 @@ class Access:
         return cls(of_operators, face or new_token(), agent or new_token(), unguessable)
 
     def of_token(self, token: str, address: str) -> Role | None:
-        """Return a token's role, or None. Raise TooManyTriesError after many invalid ones from `address`."""
+        """Return a token's role, or None. Raise TooManyTriesError if `address` has sent many invalid ones."""
         role = self._of(token, lambda known: known)
         if role in self.unguessable:
             return role
@@ -116,7 +116,7 @@ class Access:
 
     @property
     def path(self) -> str:
-        """The secret path of the page, so that servers on other ports do not receive the page's cookies."""
+        """The secret path of the page, which keeps the page's cookies from servers on other ports."""
         return f"/{self._cookie_value('path')[:SECRET_BYTES]}"
 
     def _cookie_value(self, token: str) -> str:

@@ -92,7 +92,7 @@ def outer_addresses(texts: Iterable[str]) -> tuple[OuterAddress, ...]:
 
 
 def proxies_in_front(given: Sequence[str] | None) -> tuple[OuterAddress, ...]:
-    """Return the proxies' addresses from the options, or else from config.yaml, or raise UserError."""
+    """Parse the proxies' addresses in the options or else config.yaml. Raise UserError if one is invalid."""
     file = config_file()
     if given or file is None or not file.is_file():
         return outer_addresses(given or ())
