@@ -164,7 +164,7 @@ class Gatekeeper:
     def waiting(self) -> Iterator[None]:
         """Count a `with` block as a waiting call. Raise MissionError if too many are already waiting."""
         if self._waiting >= MAX_WAITING_CALLS:
-            raise MissionError(f"{MAX_WAITING_CALLS} calls are already waiting; try again when one has ended")
+            raise MissionError(f"{MAX_WAITING_CALLS} calls are waiting; try again when one has ended")
         self._waiting += 1
         try:
             yield
