@@ -29,11 +29,11 @@ AgentContext: TypeAlias = Context[Gatekeeper, Any]
 
 
 class NotAsked(BaseModel):
-    """The answer if no dialog was shown to the person, for example because the client has no dialogs."""
+    """The answer if the person saw no dialog, for example because the client does not support dialogs."""
 
 
 class Consent(BaseModel):
-    """The dialog in which a person approves a program, or declines it."""
+    """A dialog in which a person approves or declines a program."""
 
     approve: bool = Field(
         title="Run it on the robot", description="Tick this to let the robot do exactly this."
@@ -41,14 +41,14 @@ class Consent(BaseModel):
 
 
 class Choice(BaseModel):
-    """The dialog in which a person chooses between the behaviours of different programs."""
+    """A dialog in which a person chooses between programs that behave differently."""
 
     answer: Literal["1", "2", "3", "none", "you decide"] = Field(title="Which did you mean?")
     more: str = Field(default="", max_length=MAX_WORDING, title="If none: what should be different?")
 
 
 class StepWord(BaseModel):
-    """The dialog in which a person says whether a step happened, because the log does not show it."""
+    """A dialog in which a person says whether a step happened if the log does not show it."""
 
     answer: Literal["it happened", "it did not happen"] = Field(title="Did this happen?")
 
@@ -57,7 +57,7 @@ class StepWord(BaseModel):
 
 
 class OpenQuestion(NamedTuple):
-    """A mission that waits until a person chooses a behaviour, and the question with the choices."""
+    """A mission that waits for a person to choose a behaviour, and the question to ask."""
 
     session: MissionSession
     asked: ClarifyingQuestion
@@ -84,7 +84,7 @@ def ask_which_behaviour(
 
 
 async def read_last_past(ctx: AgentContext) -> MissionPast:
-    """Return what the mission to continue did: the last one, or the one that is being continued now."""
+    """Return what the mission to continue has done: the last mission, or the one being continued now."""
     gatekeeper, console = gatekeeper_of(ctx), gatekeeper_of(ctx).console
     with as_tool_errors():
         if console.view.past is not None and not console.view.is_over:
@@ -95,7 +95,7 @@ async def read_last_past(ctx: AgentContext) -> MissionPast:
 def ask_whether(
     past: Annotated[MissionPast, Resolve(read_last_past)], ctx: AgentContext
 ) -> Elicit[StepWord] | NotAsked:
-    """Return a dialog that asks whether a step happened, or NotAsked if this is known or cannot be asked."""
+    """Return a dialog that asks whether a step happened; NotAsked if that is known or cannot be asked."""
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NotAsked()
@@ -107,7 +107,7 @@ AFTER_HOLD = "After a STOP or a lost robot, your yes also lets agents act within
 
 
 class ProposedProgram(NamedTuple):
-    """A mission to approve, with the problems and switched-off house rules that the person is shown."""
+    """A mission to approve, with the problems and the switched-off house rules to show to the person."""
 
     session: MissionSession
     problems: tuple[str, ...]

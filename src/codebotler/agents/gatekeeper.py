@@ -50,7 +50,7 @@ class Gatekeeper:
 
     Args:
         console: the robot and its current mission.
-        asks_client: whether clients may show their dialogs, because only a person can answer them.
+        asks_client: whether clients may show dialogs; False if something other than a person might answer.
         writes: whether a model is configured that can write programs.
         page: the address of the page, without its token; empty before it is served.
     """
@@ -68,7 +68,7 @@ class Gatekeeper:
     def propose(self, order: MissionOrder, steps: Steps | None = None) -> MissionSession:
         """Begin a mission that waits for approval. Raise MissionError while a person works on another one.
 
-        `steps` belongs to a step-by-step mission; None for a mission with a program.
+        `steps` holds the skill calls of a step-by-step mission; None for a mission with a program.
         """
         before = self.console.session
         view = SessionView() if before is None else before.view
@@ -86,7 +86,7 @@ class Gatekeeper:
     def propose_steps(
         self, purpose: str, bounds: Mapping[str, Any], author: str
     ) -> tuple[MissionSession, Steps]:
-        """Propose a step-by-step mission of the agent `author`, with the contract `bounds` as plain data."""
+        """Propose a step-by-step mission for the agent `author`. `bounds` is its contract as plain data."""
         if self.console.view.is_running:  # before the bounds are read, which takes time
             raise MissionError("a mission is running; wait until it is over, or stop it")
         if len(json.dumps(bounds)) > MAX_CONTRACT_CHARACTERS:
@@ -106,7 +106,7 @@ class Gatekeeper:
         if session is None or session.view.is_over:
             view = SessionView() if session is None else session.view
             why = f"; mission {view.id} is {view.phase}" if view.id else view.error and f"; {view.error}"
-            raise MissionError(f"no mission is waiting or running{why}; propose one")
+            raise MissionError(f"no mission is waiting or running{why}; propose a new one")
         if session.view.digest != digest:
             raise MissionError("the current mission has another digest; call follow_mission to see it")
         return session
@@ -154,7 +154,7 @@ class Gatekeeper:
         return self.asks_client and view.can_run and is_short
 
     def check(self, program: str) -> CheckReport:
-        """Check a program without beginning a mission, in the rooms that are known now."""
+        """Check a program in the rooms that are known now, without starting a mission."""
         checked = self.console.check(program, self.console.view.room_map, self.console.rules)
         problems = [problem.sentence for problem in checked.problems]
         problems += missing_skills(program, self.console.robot)
@@ -162,9 +162,9 @@ class Gatekeeper:
 
     @contextmanager
     def waiting(self) -> Iterator[None]:
-        """Count a `with` block as a waiting call. Raise MissionError if too many calls wait already."""
+        """Count a `with` block as a waiting call. Raise MissionError if too many are already waiting."""
         if self._waiting >= MAX_WAITING_CALLS:
-            raise MissionError(f"{MAX_WAITING_CALLS} calls are waiting already; wait until one has ended")
+            raise MissionError(f"{MAX_WAITING_CALLS} calls are waiting; try again when one has ended")
         self._waiting += 1
         try:
             yield

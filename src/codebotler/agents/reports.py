@@ -25,7 +25,7 @@ class _Report(BaseModel):
 
 
 class CheckReport(_Report):
-    """A checked program: its problems, its contract, and storyboards of it in imagined worlds."""
+    """A checked program: its problems, its contract, and its storyboards in imagined worlds."""
 
     accepted: bool = Field(description="Whether there are no problems.")
     problems: list[str]

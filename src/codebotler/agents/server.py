@@ -145,7 +145,7 @@ def over_http(server: MCPServer[Gatekeeper], announce: Callable[[str], None]) ->
 
 
 def over_stdio(server: MCPServer[Gatekeeper], streams: Streams, announce: Callable[[str], None]) -> Companion:
-    """Return a server for one agent over `streams`. When the client closes them, the page ends, too."""
+    """Return a server for one agent over `streams`. When the client closes them, the page shuts down."""
     server.streamable_http_app()  # makes the session manager, the public way to the server below
     running = server.session_manager.app
 
@@ -191,12 +191,12 @@ class _Output:
         self._writer = writer
 
     async def write(self, text: str) -> None:
-        """Write a text, and wait until the client has read most of what was written."""
+        """Write text, and wait if the client is slow to read."""
         self._writer.write(text.encode())
         await self._writer.drain()
 
     async def flush(self) -> None:
-        """Do nothing, since `write` keeps no text back."""
+        """Do nothing, since `write` buffers no text here."""
 
 
 async def _open_output(sent: BufferedWriter) -> Any:  # noqa: ANN401 - the SDK wants a file of anyio
@@ -211,7 +211,7 @@ async def _open_output(sent: BufferedWriter) -> Any:  # noqa: ANN401 - the SDK w
 def take_streams() -> Streams:
     """Reserve standard input and output for an MCP client, and send all prints to standard error.
 
-    Raise UserError if standard input is neither a pipe nor a socket, because then no client started us.
+    Raise UserError if standard input is neither a pipe nor a socket, which means that no client started us.
     """
     kind = os.fstat(0).st_mode
     if not (stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)):

@@ -45,7 +45,7 @@ _Call: TypeAlias = tuple[Skill, list[Argument], "Future[SkillOutcome]"]
 
 @dataclass
 class Steps:
-    """A step-by-step mission. An agent queues calls of skills, and the mission's thread executes them."""
+    """A step-by-step mission: an agent queues skill calls, and the mission's thread executes them."""
 
     purpose: str  # in the agent's words
     contract: Contract  # what it may call
@@ -65,7 +65,7 @@ class Steps:
         return _PROGRAM.format(mark=self.mark, purpose=purpose, contract=lines)
 
     def call(self, name: str, arguments: Mapping[str, object]) -> Future[SkillOutcome]:
-        """Queue a skill call and return its future outcome. Raise UserError if it is wrong or not allowed."""
+        """Queue a skill call and return its future. Raise UserError if the call is invalid or not allowed."""
         if name not in (self.contract.skills.keys() | TELLING_SKILLS) & {*self.skills}:
             raise UserError(f"this mission may call only {listed(list(self.contract.skills))}")
         call = self.skills[name], named_arguments(self.skills[name], arguments), Future[SkillOutcome]()
@@ -76,7 +76,7 @@ class Steps:
         return call[2]
 
     def end(self) -> None:
-        """End the mission after all calls in the queue."""
+        """End the mission once all queued calls are done."""
         self._calls.put(None)
 
     def drive(self, live: LiveRobot) -> Outcome:

@@ -128,7 +128,7 @@ async def choose_behaviour(
 ) -> MissionReport:
     """Let the person choose between several behaviours, if the proposed mission waits for this choice.
 
-    You cannot choose for them. Afterwards, the answer has the program, which still needs approval.
+    You cannot choose for them. The result contains the chosen program, which still needs approval.
     """
     gatekeeper = gatekeeper_of(ctx)
     with as_tool_errors():
@@ -156,9 +156,9 @@ async def continue_mission(
         if isinstance(answer, AcceptedElicitation) and not isinstance(answer.data, NotAsked):
             past = past.resolve(happened=answer.data.answer == "it happened")
         if past.unsure is not None:
-            raise UserError(f"{past.unsure_step_text}; a person must say so, on the page {gatekeeper.page}")
+            raise UserError(f"{past.unsure_step_text}; ask a person to answer on the page {gatekeeper.page}")
         if not program.strip() and not past.instruction:
-            raise UserError(f"mission {past.mission} has no instruction; send a program for its rest")
+            raise UserError(f"mission {past.mission} has no instruction; send a program for the rest")
         author = agent_name(ctx) if program.strip() else ""
         session = gatekeeper.propose(gatekeeper.console.rest_of(past, program, author))
         return await _prepared(gatekeeper, session)
@@ -214,9 +214,9 @@ async def run_mission(
 
 
 async def follow_mission(ctx: AgentContext, after: _After = 0, seconds: _Seconds = 45) -> MissionReport:
-    """Wait until the current mission is over, but at most `seconds`, and read what has happened.
+    """Wait up to `seconds` for the current mission to end, and return what has happened so far.
 
-    This reports progress while it waits. Cancelling this call stops nothing.
+    The tool reports progress while it waits. Cancelling this call does not stop the robot.
     """
     gatekeeper = gatekeeper_of(ctx)
     session = gatekeeper.console.session
@@ -234,7 +234,7 @@ async def call_skill(
 ) -> SkillOutcome:
     """Call one skill in an approved step-by-step mission, and wait for its result.
 
-    House rules judge each call first. If you cancel this call, the robot stops.
+    Each call is first checked against the house rules. If you cancel this call, the robot stops.
     """
     with as_tool_errors():
         session, known = gatekeeper_of(ctx).find_steps(steps)

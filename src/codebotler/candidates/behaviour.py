@@ -115,7 +115,7 @@ def count_conflicts(traces: Iterable[Trace], homes: Iterable[tuple[str, str]] = 
     """Count contradictions between runs in the same world.
 
     For example, one run meets a person whom another misses, a person is in several rooms, or a question has
-    several answers. `homes` are further people who are present, as pairs of a name and a room.
+    several answers. `homes` lists more people who are present, as (name, room) pairs.
     """
     seen = {one for trace in traces for one in _encounters(trace)}
     people = {(one.name, one.room) for one in seen if one.is_there and one.is_person} | {*homes}
@@ -127,7 +127,7 @@ def count_conflicts(traces: Iterable[Trace], homes: Iterable[tuple[str, str]] = 
 
 
 def people_sought(traces: Iterable[Trace]) -> set[tuple[str, str]]:
-    """Return the people that runs looked for or asked, as pairs of a name and a room."""
+    """Return the people that runs looked for or asked, as (name, room) pairs."""
     found = (one for trace in traces for one in _encounters(trace))
     return {(one.name, one.room) for one in found if one.is_person and one.name != SOMEBODY}
 
@@ -171,7 +171,7 @@ def rooms_with_several(traces: Iterable[Trace]) -> frozenset[str]:
 
 
 def names_in(rooms: Iterable[str], traces: Iterable[Trace]) -> re.Pattern[str]:
-    """Return a regex for the names of rooms and of people, things and options in the calls of runs.
+    """Return a regex for the names of rooms, and of the people, things and options that runs mention.
 
     Words such as "anybody", "yes" and "no" are not names.
     """

@@ -134,10 +134,10 @@ def cluster_candidates(
         programs: the candidates, at least one; equal ones count separately.
         settings: the settings of the check and of the runs.
         room_map: the rooms; by default all rooms that the programs name.
-        refused: programs that a person did not mean. Candidates that behave like one of them are left out.
+        refused: programs that a person rejected. Candidates that behave like one of them are left out.
 
     Raises:
-        UserError: all accepted candidates do what a person did not mean.
+        UserError: all accepted candidates behave like a program that a person rejected.
     """
     counts = Counter(programs)
     checks = {program: check_on(worker, program, room_map, settings) for program in counts}
@@ -162,7 +162,7 @@ def cluster_candidates(
         together.setdefault(behaviours[number], []).append(number)
     if not together:
         again = counted(len(programs) - len(rejected), "program")
-        raise UserError(f"{again} would do what you rejected before; give the instruction in other words")
+        raise UserError(f"{again} would do what you rejected before; rephrase the instruction")
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     people = frozenset(map(normalized, rooms.people))
     conflicts = [*map(bool, conflicts_in_worlds(clusters, people).values())]
@@ -204,9 +204,10 @@ def _cluster(
 
 
 def shared_rooms(programs: Iterable[str], checks: Sequence[CheckResult], settings: CheckSettings) -> RoomMap:
-    """Return one map with the rooms of all programs, without "office" if there is also "ann's office".
+    """Return one map with the rooms of all programs.
 
-    If a program asks for all rooms, add a second room of each kind, which may reveal a mistake in a loop.
+    It omits "office" if there is also "ann's office", since both names may mean the same room. If a program
+    asks for all rooms, it adds a second room of each kind, which may reveal a mistake in a loop.
     """
     start = checks[0].room_map.start
     events = (event for one in checks for sample in one.samples for event in sample.outcome.trace)
@@ -224,9 +225,9 @@ def shared_rooms(programs: Iterable[str], checks: Sequence[CheckResult], setting
 def run_in_shared_worlds(
     worker: Worker, programs: Sequence[str], room_map: RoomMap, settings: CheckSettings
 ) -> list[list[Sample]]:
-    """Run programs in the same worlds. Return a list for each program, with its run in each world.
+    """Run programs in the same worlds. Return one list per program, with its run in each world.
 
-    The first worlds are random. Further ones try the other values of the facts that a program meets.
+    The first worlds are random. Later ones try other values of the facts that a program met.
     """
     first = first_samplers(replace(settings, samples=RANDOM_WORLDS))
     new = [replace(sampler, by_options=True) for sampler in first]
@@ -242,9 +243,9 @@ def run_in_shared_worlds(
 
 
 def conflicts_in_worlds(clusters: Sequence[CandidateCluster], people: Container[str] = ()) -> dict[int, int]:
-    """Return how many contradictions there are, by the number of each world where the clusters differ.
+    """Return the number of contradictions in each world where the clusters differ, by the world's number.
 
-    `people` are names from `normalized`; their random rooms count, too.
+    The rooms that chance gives to `people` (normalized names) are taken into account.
     """
     conflicts: dict[int, int] = {}
     for number in range(len(clusters[0].samples)):

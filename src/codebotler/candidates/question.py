@@ -49,7 +49,7 @@ BRIEF, COURSE, WHOLE = (4, 70), (20, 200), (1_000, 4_000)
 
 @dataclass(frozen=True)
 class CandidateOption:
-    """A program that a person can choose, and how its behaviour differs from that of the others.
+    """A program that a person can choose, and how it behaves differently from the other options.
 
     Args:
         program: the program that the robot would run.
@@ -133,7 +133,7 @@ class ClarifyingQuestion:
         return self.options[0 if answer == "decide" else answer]
 
     def record(self, answer: ClarifyingAnswer) -> list[str]:
-        """Describe an answer for the log: which option was chosen, and which ones were not."""
+        """Return log lines about an answer: one for the chosen option, if any, and one per other option."""
         if (option := self.chosen(answer)) is None:
             return self.rejections
         who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
@@ -167,7 +167,7 @@ def question_about(
         groups: the candidates, clustered by behaviour.
         dominant_share: no question is asked if the largest cluster has at least this share of them.
         model: the model that would write other programs.
-        is_second: whether the person rejected other programs before; no new ones are written a second time.
+        is_second: whether the person has already rejected other programs, so that no more can be written.
     """
     largest = groups.clusters[0]
     if len(groups.clusters) == 1 or largest.size >= dominant_share * groups.total:
@@ -253,9 +253,9 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
 def describe_differences(
     samples: Sequence[Sample], behaviours: Sequence[Behaviour]
 ) -> list[tuple[str, frozenset[int]]]:
-    """Return for each run how it differs, such as `ends in kitchen`, and the numbers of its own steps.
+    """Return how each run differs, such as `ends in kitchen`, and the numbers, from 1, of its own steps.
 
-    All runs are in the same world. Own steps are those that not all runs share, numbered from 1.
+    All runs are in the same world. The own steps of a run are those that not all runs share.
     """
     said, traces = [one.said for one in behaviours], [one.outcome.trace for one in samples]
     rooms = {room for one in said for other in said for room, _ in one - other}  # where statements differ

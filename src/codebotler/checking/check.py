@@ -99,7 +99,7 @@ def check_on(
     settings: CheckSettings | None = None,
     known: Sequence[Sample] = (),
 ) -> CheckResult:
-    """Check a program on a worker that no other thread uses. Its earlier runs, `known`, are reused."""
+    """Check a program on a worker that no other thread uses, reusing its earlier runs in `known`."""
     how = settings or CheckSettings()
     room_map = room_map or room_map_for(program, skills=how.skills)
     with worker.one_child():
@@ -114,7 +114,7 @@ def check_on(
 def check_together(
     worker: Worker, programs: Sequence[tuple[str, RoomMap]], settings: CheckSettings
 ) -> list[CheckResult]:
-    """Check several programs, each in its rooms, on one worker. This is faster than one after another."""
+    """Check several programs, each with its own rooms. This is faster than checking one after another."""
     samplers = first_samplers(settings)[:WORLDS_AT_ONCE]
     runs = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
     return [

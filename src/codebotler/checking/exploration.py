@@ -39,7 +39,7 @@ class Exploration:
         most_calls: the highest number of calls of each skill in a run; empty if a run is endless.
         violations: the first world in which a rule is broken, by the name of the rule.
         is_complete: whether the program can do nothing else in other worlds with the same rooms.
-        is_steady: whether the same is true if facts change during a run, or if the robot fails.
+        is_steady: whether this also holds if facts change during a run, or if skills fail.
     """
 
     cases: int
@@ -56,7 +56,7 @@ class ExploringGuard(RuleGuard):
     Args:
         rules: the house rules.
         room_map: the rooms.
-        fails_at: the call, from 0, in which the robot fails; None if it never does.
+        fails_at: the number, from 0, of the call that fails; None if no call fails.
     """
 
     def __init__(self, rules: Sequence[Rule], room_map: RoomMap, fails_at: int | None = None) -> None:
@@ -69,7 +69,7 @@ class ExploringGuard(RuleGuard):
         self.violations: set[str] = set()  # names of rules
 
     def judge_call(self, row: Skill, arguments: Sequence[Argument], goals: Sequence[str], place: str) -> None:
-        """Record the next call. Raise RobotError if this is the call in which the robot has to fail."""
+        """Record the next call. Raise RobotError if this is the call that should fail."""
         call = RequestedCall.of(row, arguments, goals, place)
         if row.returns.base is not None and row.name not in TELLING_SKILLS:
             self.asks_again |= call in self._asked
@@ -79,7 +79,7 @@ class ExploringGuard(RuleGuard):
             raise RobotError("SkillFailed", f"the skill {row.name} failed")
 
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
-        """Record, without refusing anything, the rules that a possible next event would break."""
+        """Record the rules that a possible next event would break, but refuse nothing."""
         self._keep(self.find_violations(attempts, is_drive=is_drive))
 
     def judge_result(self, event: Event) -> None:
@@ -87,7 +87,7 @@ class ExploringGuard(RuleGuard):
         self._keep(self.add_event(event))
 
     def find_first_unkept(self) -> None:
-        """Record all rules that are broken if the mission ends now, instead of returning the first."""
+        """Record all rules that would be broken if the mission ended now, but return none of them."""
         self._keep(self.find_unkept())
 
     def _keep(self, found: Iterable[RuleViolationError]) -> None:
@@ -98,7 +98,7 @@ def explore(worker: Worker, program: str, room_map: RoomMap, settings: CheckSett
     """Run a program in all worlds that it can tell apart, or in as many of them as the budget allows.
 
     If the program assumes facts, explore two kinds of worlds: those where these facts hold, as in a check,
-    and those where each may be false. If it catches errors, also let the robot fail in one call of a run.
+    and those where each may be false. If it catches errors, also run it once per call, letting the call fail.
     """
     calls: set[RequestedCall] = set()
     most: Counter[str] = Counter()

@@ -100,7 +100,7 @@ class Sample:
     repeated: Trace = ()  # the steps that a mission which the program continues has done already
 
     def would_repeat_in(self, sampler: FactSampler) -> bool:
-        """Whether the program would meet the same facts in the sampler's world, and so do the same."""
+        """Whether a run in the sampler's world would be the same, since all facts that it met hold there."""
         return all(draw.holds_in(sampler) for draw in self.draws)
 
     @property
@@ -153,7 +153,7 @@ class CheckResult:
 
     @property
     def assumption(self) -> str:
-        """A sentence that lists the facts which the program takes for granted; empty if there are none."""
+        """A sentence that lists the facts the program takes for granted; empty if there are none."""
         facts = (one.sentence for sample in self.samples for one in sample.facts if not one.is_random)
         found = listed(elide_list([*dict.fromkeys(facts)], MAX_ASSUMED_FACTS))
         return f"The program takes for granted that {found}." if found else ""

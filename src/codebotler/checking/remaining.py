@@ -22,7 +22,7 @@ from codebotler.simulator.worlds.sampled_robot import SampledRobot
 def remaining_outcomes(
     begun: str, room_map: RoomMap, skills: SkillTable, *, first: int = 0, worker: Worker | None = None
 ) -> tuple[Outcome, ...]:
-    """Return what an interrupted program would still do, once for each sampled world where it does not fail.
+    """Return what an interrupted program would still do, one outcome per sampled world without failure.
 
     The result is empty if the program always fails, or does not repeat the steps in `room_map.past`.
 
@@ -51,14 +51,14 @@ def remaining_outcomes(
 
 
 class RepeatingRobot(SampledRobot):
-    """A robot that first returns the recorded results of earlier steps, then acts in a sampled world."""
+    """A robot that first replays the recorded results of earlier steps, then acts in a sampled world."""
 
     def __init__(self, room_map: RoomMap, sampler: FactSampler, how: CheckSettings, first: int) -> None:
         super().__init__(room_map, sampler, how.simulation, how.skills)
         self.left = deque(event for event in room_map.past[first:] if not event.failed)
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Return the recorded result of the next earlier step, or raise RobotError for a different call."""
+        """Replay the next earlier step, or act after the last one. Raise RobotError if the call differs."""
         if not self.left:
             return super().execute(skill, arguments)
         row, past = self.skills[skill], self.left[0]

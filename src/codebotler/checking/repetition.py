@@ -42,9 +42,9 @@ _PUNCTUATION = re.compile(r"[^\w\s]+")
 def with_repetition_problems(
     found: CheckResult, begun: str, remaining: Sequence[Outcome] = ()
 ) -> CheckResult:
-    """Return a check with further problems: steps that were done already, and a thing that is not put down.
+    """Return a check with further problems: repeated steps, and a held thing that is never put down.
 
-    If the first program waits without end, this is no problem in the new one: the event may still come.
+    Endless waiting is allowed if the first program would also wait: what it waits for may still happen.
 
     Args:
         found: the check of a program for the rest of a mission; `room_map.past` has the steps done so far.
@@ -83,7 +83,7 @@ def with_repetition_problems(
 def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome] = ()) -> Iterator[Event]:
     """Yield the steps of a trace that the robot has done already, such as the same question in the same room.
 
-    If the trace has more steps of a kind in a room than `remaining`, similar wording counts as the same step.
+    If the trace has more steps of a kind in a room than `remaining`, a step on the same topic also counts.
     """
     done = _distinct(event for event in room_map.past if not event.failed)
     later = _distinct(event for one in remaining for event in one.trace)

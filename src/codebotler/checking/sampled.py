@@ -47,7 +47,7 @@ class CheckSettings:
 
 
 class UnwantedCheckError(Exception):
-    """Raised before the next run of a check if its result is not wanted any more (see `CheckSettings`)."""
+    """Raised before the next run of a check whose result is no longer wanted (see `CheckSettings`)."""
 
 
 class SampledRuns:
@@ -62,7 +62,7 @@ class SampledRuns:
         self.job: Job = program, [partial(self._new_robot, number) for number in range(len(samplers))]
 
     def samples_on(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
-        """Return a sample for each different world. Outcomes in `known`, by the world's index, are reused."""
+        """Return one sample per different world, reusing the outcomes in `known` (by the world's index)."""
         ran: list[Sample] = []
         for number, sampler in enumerate(self.samplers):
             if number in known:
@@ -107,10 +107,10 @@ def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
 def run_in_sampled_worlds(
     worker: Worker, program: str, room_map: RoomMap, settings: CheckSettings, known: Sequence[Sample] = ()
 ) -> list[Sample]:
-    """Run a program in random worlds, then in more, up to a limit, to try all values of the facts it meets.
+    """Run a program in random worlds, then in worlds that vary the facts it met, up to a limit.
 
-    Further worlds are also added while every run waits or searches without success. If a run would repeat
-    an earlier one, or one of `known`, the program is not run again, and the result is copied.
+    More worlds are added while every run waits or searches without success. A run that would repeat
+    an earlier one, or one in `known`, is skipped, and its result is copied.
     """
     runs = [*known]  # which differ
     ran: list[Sample] = []

@@ -41,14 +41,14 @@ def _step_data(number: int, event: Event, *, has_places: bool) -> dict[str, Any]
 
 
 def event_from_step(step: Mapping[str, Any]) -> Event:
-    """Convert a step from `steps_of` back to an event, which has no place."""
+    """Convert a step from `steps_of` back to an event, with an empty place."""
     options = tuple(map(option_from, step.get("options", ())))
     more = tuple(step.get("more", ()))
     return Event(step["kind"], step["text"], options, step.get("answer"), step.get("found"), more=more)
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
-    """Return a table of steps, room by room. Steps with numbers in `needed` are marked and never left out."""
+    """Return a table of steps, room by room. Steps in `needed` are marked, and the first are always shown."""
     table = grid("right", "left")
     if not steps:
         table.add_row(Text(), Text("the robot did nothing", "dim"))
@@ -70,7 +70,7 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 def select_steps(
     steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 ) -> Iterator[tuple[bool, Sequence[Mapping[str, Any]]]]:
-    """Yield groups of steps, and whether to show each: of a long trace, both ends and the first `needed`."""
+    """Yield groups of steps as (is shown, steps). A long trace shows its ends and the first `needed`."""
     marked = [step["step"] for step in steps if step["step"] in needed][:MAX_SHOWN_STEPS]
 
     def is_shown(step: Mapping[str, Any]) -> bool:
@@ -102,7 +102,7 @@ def _drive(step: Mapping[str, Any]) -> Text:
 
 
 def grid(*justify: Literal["left", "right"]) -> Table:
-    """Return a table without lines, and with columns of these alignments. Right-aligned ones never wrap."""
+    """Return a table without lines, with one column per alignment. Right-aligned columns never wrap."""
     table = Table.grid(padding=(0, 2, 0, 0))
     for side in justify:
         table.add_column(justify=side, no_wrap=side == "right", overflow="fold")

@@ -75,7 +75,7 @@ def model_settings(
     seed: ModelSeedOption = None,
     timeout: TimeoutOption = SamplingSettings.timeout,
 ) -> SamplingSettings:
-    """Return the settings that these options give. Raise UserError if one is invalid or two contradict."""
+    """Return the settings that these options describe. Raise UserError if one is invalid or two conflict."""
     if settings not in {None, "paper"}:
         raise UserError(f'unknown settings "{settings}"; use --settings paper, or leave out --settings')
     if settings is not None and max_tokens is None:  # the paper's temperature and top-p are the defaults
@@ -120,7 +120,7 @@ def note_unsent(asked: SamplingSettings, model: Model | BatchModel) -> None:
 
 
 def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], CommandT]:
-    """Return a decorator for a command with `**shared`, which adds the options of the function `called`."""
+    """Return a decorator that adds the options of the function `called` to a command with `**shared`."""
 
     def extended(command: CommandT) -> CommandT:
         inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
@@ -135,5 +135,5 @@ def inherit_options(called: Callable[..., object]) -> Callable[[CommandT], Comma
 
 
 def options_for(called: Callable[..., object], given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return those of the options `given`, by name, that are parameters of the function `called`."""
+    """Return the options in `given`, by name, that are parameters of the function `called`."""
     return {name: given[name] for name in signature(called).parameters}

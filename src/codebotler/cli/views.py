@@ -37,7 +37,7 @@ CLEAR_LINE = "\r\x1b[2K"
 
 
 class EventPrinter:
-    """Prints a mission's events as they happen. On a terminal, the next event overwrites feedback."""
+    """Prints a mission's events as they happen. On a terminal, feedback disappears at the next event."""
 
     def __init__(self, robot: str) -> None:
         self._console = console(highlight=False)
@@ -127,7 +127,7 @@ def list_view(summaries: Sequence[MissionSummary]) -> RenderableType:
 def mission_view(
     summary: MissionSummary, events: Sequence[LogLine], rest: MissionSummary | None = None
 ) -> RenderableType:
-    """Return a view of a mission: its program, its events, how it ended, and how its `rest` ended."""
+    """Return a view of a mission: its program, events and end, and the end of its continuation `rest`."""
     head = Text.assemble((f"mission {summary.id}", "bold"), f" on the robot {summary.robot}")
     if summary.instruction:
         head.append(f"\n{shortened(summary.instruction)}")

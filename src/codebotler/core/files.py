@@ -115,7 +115,7 @@ def parse_row(line: bytes, example: str | None = None) -> dict[str, Any] | None:
 
 
 def to_line(row: object) -> bytes:
-    """Encode a row as a line of JSON in UTF-8. Lone surrogates, which UTF-8 lacks, become JSON escapes."""
+    """Encode a row as a line of JSON in UTF-8. Lone surrogates, which are not valid UTF-8, become escapes."""
     return json.dumps(row, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
 
 
@@ -201,7 +201,7 @@ def write_whole(path: Path, content: bytes | memoryview) -> None:
 
 @contextmanager
 def open_replacement(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
-    """Open a file that replaces `path` when the `with` block ends without error; `temporary` until then."""
+    """Open a temporary file that replaces `path` if the `with` block ends without an error."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = temporary or path.with_name(path.name + ".new")
     try:

@@ -70,7 +70,7 @@ class Program:
 
 @lru_cache(maxsize=8)
 def parse(source: str) -> ast.Module:
-    """Parse a program, or raise an error of `ast.parse`. Do not change the tree, which callers share."""
+    """Parse a program. Raise the same errors as `ast.parse`. Do not modify the tree: callers share it."""
     _expect_short_rows(source)
     with _PARSING:
         return ast.parse(compose(source), SOURCE_NAME)
@@ -83,17 +83,17 @@ def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
 
 
 def parse_expression(source: str) -> ast.expr:
-    """Return the syntax tree of an expression, or raise an error of `ast.parse`."""
+    """Return the syntax tree of an expression. Raise the same errors as `ast.parse`."""
     _expect_short_rows(source)
     with _PARSING:
         return ast.parse(source, SOURCE_NAME, mode="eval").body
 
 
 def _expect_short_rows(source: str) -> None:
-    """Raise SyntaxError if a letter has too many accents, since `ast.parse` normalizes names, too."""
+    """Raise SyntaxError if a letter has too many accents, since `ast.parse` also normalizes names."""
     for start, _ in long_rows(source):
         line = source.count("\n", 0, start) + 1
-        raise SyntaxError(f"more than {MAX_ACCENTS} accents on one letter", (SOURCE_NAME, line, None, None))
+        raise SyntaxError(f"a letter has more than {MAX_ACCENTS} accents", (SOURCE_NAME, line, None, None))
 
 
 def parse_program(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
@@ -131,14 +131,14 @@ def _text_flaw(source: str) -> Flaw:
 def literal(node: ast.expr) -> Any:  # noqa: ANN401 - texts, numbers, booleans, lists of them
     """Return the value of a literal, such as `["yes", "no"]`. Raise ValueError for other nodes.
 
-    Dictionaries and sets are rejected, too, since hash collisions can make them slow to build.
+    Also reject dictionaries and sets, since hash collisions can make them slow to build.
     """
     try:
         if not any(isinstance(part, ast.Dict | ast.Set) for part in ast.walk(node)):
             return ast.literal_eval(node)
     except (TypeError, SyntaxError, MemoryError, RecursionError) as error:
         raise ValueError(str(error)) from None
-    raise ValueError("a value with a dictionary or a set is not allowed")
+    raise ValueError("the value contains a dictionary or a set; use a list")
 
 
 def parse_leniently(source: str) -> ast.Module:
@@ -175,10 +175,7 @@ def _bound_in_module(source: str) -> set[str]:
 
 
 def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[str]:
-    """Return the names that a program binds in any scope, with `*` for `from x import *`.
-
-    Skip the nodes in `ignoring`.
-    """
+    """Return the names that a program binds in any scope (`*` for `from x import *`), skipping `ignoring`."""
     names: set[str] = set()
     skipped = {id(node) for node in ignoring}
     for node in nodes(tree):
@@ -197,7 +194,7 @@ def all_bound_names(tree: ast.Module, ignoring: Iterable[ast.AST] = ()) -> set[s
 
 
 def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, int]:
-    """Return the line of each skill's first use, by the skill's name, without skills that are redefined."""
+    """Return the line of each skill's first use, by name. Skip skills that the program redefines."""
     rebound = all_bound_names(tree)
     lines: dict[str, int] = {}
     for node in nodes(tree):
@@ -207,13 +204,13 @@ def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, in
 
 
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
-    """Return for each undefined name its line, the name, and whether it is a local variable used early."""
+    """Return the line of each undefined name, the name, and whether it is a local used before assignment."""
     from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - takes a tenth of a second
     from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - slow
 
     class NameChecker(Checker):  # type: ignore[misc]  # pyflakes has no types
         def handleStringAnnotation(self, *_: object) -> None:  # noqa: N802 - a method of pyflakes
-            """Report no names in string annotations, since Python never looks them up."""
+            """Ignore names in string annotations, since Python never looks them up."""
 
     with _PARSING:
         found = NameChecker(tree, builtins={*skills, *GIVEN_MODULES}, withDoctest=False).messages

@@ -19,7 +19,7 @@ class Option(NamedTuple):
 
     Args:
         text: the option as text.
-        is_text: False if the program offered another type, such as a number, which RTL cannot judge.
+        is_text: whether the program offered a string. Formulas cannot judge options of other types.
     """
 
     text: str
@@ -27,7 +27,7 @@ class Option(NamedTuple):
 
 
 def to_options(values: Iterable[object]) -> tuple[Option, ...]:
-    """Convert a question's options, such as texts or numbers, to `Option`. Keep those that are `Option`."""
+    """Convert a question's options, such as strings or numbers, to `Option`, unless they already are."""
     return tuple(
         [one if isinstance(one, Option) else Option(str(one), isinstance(one, str)) for one in values]
     )
@@ -74,7 +74,7 @@ def attempted_event(
     time: float,
     holding: str = "",
 ) -> Event | None:
-    """Return a call's event before its result, such as `Event("goto", "kitchen")`; None if not recorded."""
+    """Return a call's event without its result, such as `Event("goto", "kitchen")`; None if it has none."""
     if skill.recording is None:
         return None
     row, given = skill.recording, dict(zip((p.name for p in skill.parameters), arguments, strict=True))

@@ -46,7 +46,7 @@ class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chose
     def descend_resolver(self, parent: yaml.Node | None, index: object) -> None:
         self.depth += 1
         if self.depth > MAX_DEPTH:
-            raise _fault(f"the text is nested more than {MAX_DEPTH} levels deep", parent)
+            raise _fault(f"the text is nested more than {MAX_DEPTH} levels deep; simplify the file", parent)
         super().descend_resolver(parent, index)
 
     def ascend_resolver(self) -> None:
@@ -105,7 +105,7 @@ class YamlFile:
         return self._lines[path]
 
     def part(self, key: str, data: object) -> YamlFile:
-        """Return the part of this file under a key as a YamlFile. Its errors give lines of the whole file.
+        """Return the part under a key as a YamlFile, whose errors still give the lines of the whole file.
 
         Args:
             key: a key of the file.
@@ -123,7 +123,7 @@ class YamlFile:
     def validate(self, model: type[FileModel], data: object = None, *, at: YamlPath = ()) -> FileModel:
         """Convert the content to a pydantic model, or raise UserError with the line of a mistake.
 
-        If `data` is given, convert these data instead, which are at the path `at` in the file.
+        If given, `data` is converted instead. It comes from the path `at` in the file.
         """
         try:
             return model.model_validate(self.data if data is None and not at else data)

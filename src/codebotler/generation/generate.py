@@ -107,7 +107,7 @@ async def make_attempt(
     settings: SamplingSettings,
     find_problems: Checker | None = None,
 ) -> Attempt:
-    """Check the program in a reply, and return the attempt. If there is no program, the problem says so."""
+    """Check the program in a reply, and return the attempt. If there is no program, that is its problem."""
     if (none := describe_programless(reply, settings)) is not None:
         return Attempt(number, prompt, reply, (none.sentence,), none)
     found = () if find_problems is None else await asyncio.to_thread(find_problems, reply.program)
@@ -149,7 +149,7 @@ def write_checked_program(
     repair: bool = False,
     on_attempt: Callable[[Attempt], None] = ignore_attempt,
 ) -> Generation:
-    """Ask a model, at most `retries` + 1 times, until a program passes the check. Return all attempts."""
+    """Ask a model up to `retries` + 1 times, until a program passes the check. Return all attempts."""
     with WorkerPool(1) as pool:
 
         def find_problems(program: str) -> list[str]:

@@ -45,7 +45,7 @@ class _Job:
         return self.on_text is not None and not self.ending.done()
 
     def pass_on(self, text: str) -> None:
-        """Send the listener the part of `text` that it has not received. Call this on the model's thread."""
+        """Send the listener the part of `text` that is new to it. Call this on the model's thread."""
         if self.on_text is not None and self.is_wanted and len(text) > self.passed:
             self.ending.get_loop().call_soon_threadsafe(self.on_text, text[self.passed :])
             self.passed = len(text)
@@ -65,7 +65,7 @@ class LocalModel:
 
     It is a chat model if its tokenizer has a chat template, otherwise a base model. With a seed, replies are
     generated in blocks that depend only on the numbers of the replies, so a resumed run gives the same
-    replies. Without a seed, waiting requests form a batch. `settings.timeout` is ignored.
+    replies. Without a seed, waiting requests are batched. `settings.timeout` is ignored.
     """
 
     def __init__(self, path: str, settings: SamplingSettings) -> None:

@@ -93,7 +93,7 @@ class ChosenModel:
     max_tokens: int | None = None  # None means the default limit for a reply
 
     def add_server(self, settings: SamplingSettings) -> SamplingSettings:
-        """Return the settings with this model's server, and with its token limit if they have none."""
+        """Return the settings with this model's server, and with its token limit unless they set one."""
         limit = settings.max_tokens or self.max_tokens
         return replace(settings, base_url=self.base_url, max_tokens=limit)
 
@@ -116,7 +116,7 @@ class ConfigFile(BaseModel):
 
 
 def choose_model(name: str | None = None, base_url: str | None = None) -> ChosenModel:
-    """Return the given model, or else the model in CODEBOTLER_MODEL or config.yaml, or a recorded model.
+    """Return the given model, or else the one from CODEBOTLER_MODEL or config.yaml, or a recorded model.
 
     The server and the token limit in config.yaml apply only to the model that is named there.
 

@@ -102,7 +102,7 @@ class RateLimited:
                 raise
 
     async def close(self) -> None:
-        """Close the model."""
+        """Close the wrapped model."""
         await self.model.close()
 
     async def _try(

@@ -26,7 +26,7 @@ MAX_TEXTS, MAX_CHARACTERS = 1_000, 50_000  # of an argument; it may have any tex
 def derive_contract(
     found: Exploration, written: WrittenArguments, room_map: RoomMap, skills: SkillTable
 ) -> Contract:
-    """Return a contract that allows all that a program may do.
+    """Return a contract that allows everything that a program may do.
 
     An argument may have the texts that are written in the program, such as "hall" in `go_to("hall")`, and
     those of all explored calls. If the program computes other texts, and not all of its worlds were

@@ -84,14 +84,14 @@ class HouseRuleFile(BaseModel):
     def with_single_names(
         self, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets
     ) -> Iterator[Rule]:
-        """Yield a copy of the rule for each name in its sets, with this name only, to find wrong ones."""
+        """For each name in the rule's sets, yield the rule for this name alone, to find unknown rooms."""
         (text,) = self._texts.values()
         for used in {tag[1] for tag in SET_TAG.finditer(text)} & {*sets}:
             yield from (self.rule(file, at, skills, {**sets, used: [name]}) for name in sets[used])
 
     def _formula(self, text: str, file: YamlFile, at: YamlPath, skills: SkillTable, sets: Sets) -> Formula:
         if self.for_each is not None and EACH_TAG not in text:
-            raise file.wrong(f'"for_each" needs {EACH_TAG} in the formula', *at)
+            raise file.wrong(f'the formula has no {EACH_TAG}; put it where "for_each" inserts names', *at)
         if self.for_each is None and EACH_TAG in text:
             raise file.wrong(f'{EACH_TAG} in a formula needs "for_each" with a list of names', *at)
         if isinstance(self.for_each, str):

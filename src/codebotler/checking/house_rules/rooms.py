@@ -21,7 +21,7 @@ from codebotler.simulator.worlds.matching import is_in_request, meant_by
 
 
 def unknown_rooms_in(rule: Rule, rooms: Sequence[str]) -> Iterator[str]:
-    """Yield an error message for each room in a rule that does not exist; none if `rooms` is empty."""
+    """Yield an error message for each unknown room that a rule names; none if `rooms` is empty."""
     if rule.any_room or not rooms:
         return
     poses = {pattern for one in rule.inside for pattern in patterns(one.text)}
@@ -44,7 +44,7 @@ def room_patterns(rule: Rule) -> Iterator[str]:
 
 
 def may_mean(pattern: str, labels: Iterable[str]) -> bool:
-    """Whether a regex may mean one of the labels. Also True if it matches every text or none at all."""
+    """Whether a regex may mean one of the labels. Also True if it is too general or complex to tell."""
     matches, texts = Regex(pattern).matches, samples(pattern)
     return (
         not texts

@@ -63,11 +63,11 @@ class PossibleValues:
                 self._bind_parameters(node, self._functions.get(node.func.id))
 
     def variable(self, name: ast.Name) -> str:
-        """Return a key for a variable: its name, with the position of the comprehension that binds it."""
+        """Return a key for a variable: its name, plus the position of its comprehension if it has one."""
         return self._own.get(name, name.id)
 
     def of(self, node: ast.expr) -> list[PossibleValue]:
-        """Return the expressions that may be a node's value, such as "hall" for `room`; None if unknown."""
+        """Return the possible values of a node, such as "hall" for `room`, with None for an unknown value."""
         found: list[PossibleValue] = []
         seen: set[str | ast.expr] = set()
         waiting: list[PossibleValue] = [node]

@@ -82,7 +82,7 @@ class _RoomNames:
         self.values = PossibleValues(tree, guess_entries=True)
 
     def rooms(self) -> list[str]:
-        """Return the rooms to which the program drives or which it compares with a room, in source order."""
+        """Return the rooms that the program drives to or compares with a room, in source order."""
         found = {text for _, request in _requests(self.tree, self.drives) for text in self.texts(request)}
         driven = {self._variable(request) for _, request in _requests(self.tree, self.drives)} - {None}
         for node in nodes(self.tree):
@@ -90,7 +90,7 @@ class _RoomNames:
         return [text for _, _, text in sorted(found - {A_ROOM}) if any(map(str.isalpha, text))]
 
     def texts(self, node: ast.expr) -> set[TextLiteral]:
-        """Return the known texts that an expression or its elements may have, with their positions."""
+        """Return the line, column and text of each string that a node or its elements may be."""
         found = set()
         for value in self.values.of(node):
             match value:

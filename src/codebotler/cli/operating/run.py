@@ -69,7 +69,7 @@ class Request:
         """Return the mission to begin on the console. This reads the program file or standard input."""
         program = read_program(self.what) if self.is_program else ""
         if console.was_stopped:  # while a person was asked what had happened
-            raise UserError("somebody pressed STOP, so nothing was begun; run this command again")
+            raise UserError("STOP was pressed before the mission began; run this command again")
         if self.past is not None:
             return console.rest_of(self.past, program)
         return MissionOrder("" if program else self.what, program=program, asks=not self.yes)
@@ -84,7 +84,7 @@ class Request:
 
 
 def run(console: Console, request: Request) -> int:
-    """Carry out a user's request from the program to the end of the mission, and show each step.
+    """Carry out a user's request, from writing the program to the end of the mission, and show each step.
 
     If a skill fails, a model may write the rest, which is run in the same way.
 
@@ -253,7 +253,7 @@ def _stopped_by_signals(console: Console) -> Iterator[list[int]]:
 
 
 def choose_past(console: Console, name: str, program: str) -> MissionPast:
-    """Read what a mission did, show it, and ask a person about a step that may have happened or not.
+    """Read what a mission did, show it, and ask a person whether the uncertain step, if any, happened.
 
     Args:
         console: the console with the robot. Before a question about a step, the robot is asked where it is.

@@ -116,7 +116,7 @@ def choose_candidate(
         ask: asks a question and returns the typed line; if None, the most frequent behaviour is taken.
 
     Raises:
-        UserError: all programs of the second round do what the person did not mean.
+        UserError: all programs of the second round do what the person rejected.
     """
     rejected: ClarifyingQuestion | None = None
     while True:

@@ -27,7 +27,7 @@ NO_EFFECT = "not at all"
 
 
 def find_replayed_files(paths: Sequence[Path]) -> list[Path]:
-    """Return the programs, logs and missions in files and folders. Raise UserError if a path has none."""
+    """Find the programs, logs and missions at these paths. Raise UserError if a path has none."""
     found: list[Path] = []
     for path in paths:
         if not path.exists():
@@ -47,7 +47,7 @@ def _is_replayed(path: Path) -> bool:
 def replay(
     files: Sequence[Path], rules: Sequence[Rule], world: World | None, skills: SkillTable
 ) -> dict[Path, RuleEffect]:
-    """Return for each file which house rule it would break, and when. Programs are run, logs are read."""
+    """Return which house rule each file would break, and when. Run the programs, but only read the logs."""
     effects = {file: RuleEffect("unreadable") for file in files}  # in this order
     programs: dict[Path, str] = {}
     for file in effects:

@@ -31,7 +31,7 @@ WHEN_WORDS = {
 
 
 def rules_for(world: World | None, path: Path | None, skills: SkillTable = SKILLS) -> tuple[Rule, ...]:
-    """Read a rules file, if given, and print a warning if a rule can be evaded. Raise UserError if wrong."""
+    """Read a rules file, if given, and warn if rules can be evaded. Raise UserError if a rule is invalid."""
     rules = () if path is None else read_rules(path, skills, rooms_of(world))
     for sentence in find_evasions(rules, rooms_of(world), skills):
         note(sentence)

@@ -94,7 +94,7 @@ def _example(row: Skill) -> list[Any]:
 
 
 def skills_view(skills: SkillTable) -> RenderableType:
-    """Return custom skills, or else the built-in ones, as models see them, with example outcomes."""
+    """Return the custom skills (or the built-in ones if there are none) as models see them, with outcomes."""
     own = [row for row in skills.rows if row not in SKILLS.rows]
     return Group(*_lines(own or SKILLS.rows, skills))
 

@@ -40,7 +40,7 @@ class Simulation(Protocol):
         """A dictionary in which skills keep data during a run, such as which doors are open."""
 
     def outcome(self, skill: str, arguments: Sequence[Any]) -> Any:  # noqa: ANN401 - the skill's type
-        """Return the result of a skill with an empty body, from `truths` or random, or raise its error."""
+        """Return the result of a skill with an empty body, from `truths` or at random, or raise its error."""
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
         """Return the names of all things, or of some: `things("kitchen", "fruit")` for fruit in a kitchen."""

@@ -35,9 +35,9 @@ class BatchRequest:
 
 
 class BatchModel:
-    """Builds requests for a batch file, and parses the answers later. Sends nothing and needs no key.
+    """Builds the requests of a batch file and parses the responses, without sending anything or using a key.
 
-    To do so, it gives a `ChatModel` or `CompletionsModel` a fake server inside this process.
+    Internally, a `ChatModel` or `CompletionsModel` talks to a fake server in this process.
     """
 
     def __init__(self, name: str, settings: SamplingSettings) -> None:
@@ -71,7 +71,7 @@ class BatchModel:
         return BatchRequest("/v1/chat/completions" if is_chat else "/v1/completions", body)
 
     def reply(self, prompt: Prompt, *, number: int, status: int, body: object) -> Reply:
-        """Return the reply in an answer with this HTTP status and JSON body, or raise ModelError."""
+        """Parse the reply in a response with this HTTP status and JSON body, or raise ModelError."""
         if status < FIRST_ERROR and not _has_choice(body):
             raise error_in_reply(self.name, body)
         short = replace(prompt, messages=prompt.messages[-1:])  # encoding a long prompt would only cost time

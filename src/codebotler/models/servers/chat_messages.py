@@ -50,7 +50,7 @@ def definition_of(tool: Tool) -> ToolDefinition:
 
 
 def turn_of(reply: Reply, response: messages.ModelResponse) -> Reply:
-    """Return a copy of a reply to a `ToolPrompt`, with the calls in `response` and without a program."""
+    """Return a copy of a reply to a `ToolPrompt` with the tool calls in `response` instead of a program."""
     parts = [part for part in response.parts if isinstance(part, messages.ToolCallPart)]
     calls = tuple(ToolCall(one.tool_call_id, one.tool_name, one.args_as_json_str()) for one in parts)
     known = reply.no_program if reply.no_program in {"refusal", "filtered"} else None

@@ -26,7 +26,7 @@ CERTIFICATE_VARIABLES = ("SSL_CERT_FILE", "SSL_CERT_DIR")
 
 
 def byte_limit(max_tokens: int | None) -> int:
-    """Return a generous limit, in bytes, for a reply of up to `max_tokens` tokens (None: any number)."""
+    """Return a generous limit, in bytes, for a reply of up to `max_tokens` tokens (None for no limit)."""
     return max(MIN_REPLY_BYTES, BYTES_PER_TOKEN * (max_tokens or ASSUMED_TOKENS))
 
 
@@ -123,7 +123,7 @@ def _is_loopback(host: str) -> bool:
 
 
 def opening_error(name: str, error: Exception) -> UserError:
-    """Build the error for a model whose HTTP client cannot be created, for example with a wrong proxy."""
+    """Build the error for a model whose HTTP client cannot be created, such as for an invalid proxy."""
     for variable in CERTIFICATE_VARIABLES:
         if (path := os.environ.get(variable)) and not Path(path).exists():
             return UserError(f"{name} cannot be used: {variable} names {path}, which does not exist")

@@ -14,7 +14,7 @@ FAILURE_REASONS = {"abort", "error", "insufficient_system_resource"}  # finish r
 
 
 class LenientDecoder(SSEDecoder):
-    """A decoder of server-sent events that skips those without data. `is_done` is True after `[DONE]`."""
+    """A decoder of server-sent events that skips events without data. `is_done` is True after `[DONE]`."""
 
     is_done = False
 
