@@ -16,14 +16,14 @@ _HOLE = "\ud800"  # a lone surrogate
 
 @dataclass(frozen=True)
 class TextTemplate:
-    """A text with placeholders, such as `Go to the {}.`. Each stands for any text, even an empty one.
+    """A text with gaps, such as `Go to the {}.`. Each stands for any text, even an empty one.
 
     Comparisons ignore case, Unicode composition and the amount of whitespace.
 
     Args:
-        parts: the pieces around placeholders, such as `("Go to the ", ".")`. A single piece has none, and two
+        parts: the pieces around gaps, such as `("Go to the ", ".")`. A single piece has none, and two
             empty pieces match any text. A template with more than 20 pieces or 2,000 characters, or with
-            the character U+D800, also matches any text. Adjacent placeholders become one.
+            the character U+D800, also matches any text. Adjacent gaps become one.
 
     Raises:
         ValueError: there are no parts.
@@ -48,7 +48,7 @@ class TextTemplate:
 
     @cached_property
     def joined(self) -> str:
-        """The template as text for comparisons: normalized, lower-case, with U+D800 for each placeholder."""
+        """The template as text for comparisons: normalized, lower-case, with U+D800 for each gap."""
         return _comparable(_HOLE.join(self.parts))
 
     @cached_property
@@ -56,7 +56,7 @@ class TextTemplate:
         return self.joined.split(_HOLE)
 
     def matches(self, text: str) -> bool:
-        """Whether a text consists of the pieces in order, with any text in place of each placeholder."""
+        """Whether a text consists of the pieces in order, with any text in place of each gap."""
         return _are_in_order(self._pieces, _comparable(text))
 
     def covers(self, other: TextTemplate) -> bool:
@@ -68,7 +68,7 @@ class TextTemplate:
 
     @staticmethod
     def excess(templates: Iterable[TextTemplate], allowed: Iterable[TextTemplate]) -> list[TextTemplate]:
-        """Return the templates that no template in `allowed` covers. This is fast without placeholders."""
+        """Return the templates that no template in `allowed` covers. This is fast without gaps."""
         known = [*allowed]
         exact, open_ones = {one.joined for one in known}, [one for one in known if len(one.parts) > 1]
         left = [one for one in templates if one.joined not in exact]
@@ -79,10 +79,10 @@ class TextTemplate:
 
     @classmethod
     def parse(cls, text: str) -> TextTemplate:
-        """Parse a template in which {} is a placeholder, and {{ and }} are braces.
+        """Parse a template in which {} is a gap, and {{ and }} are braces.
 
         Raises:
-            ValueError: a brace is neither doubled nor part of a placeholder.
+            ValueError: a brace is neither doubled nor part of a gap.
         """
         parts = [""]
         for piece, field, form, conversion in Formatter().parse(text):
