@@ -15,8 +15,7 @@ def listed(parts: Sequence[str], last: str = "and") -> str:
 
 def elide_list(parts: Sequence[str], most: int = 5) -> list[str]:
     """Shorten a long enumeration to its first `most` parts and, for example, `3 more`, but never `1 more`."""
-    more = len(parts) - most
-    return [*parts[:most], f"{more:,} more"] if more > 1 else [*parts]
+    return [*parts] if len(parts) <= most + 1 else [*parts[:most], f"{len(parts) - most:,} more"]
 
 
 def counted(number: int, noun: str) -> str:

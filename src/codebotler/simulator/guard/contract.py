@@ -49,9 +49,8 @@ class RequestedCall:
             if is_goal(row, parameter.name) and rooms and isinstance(value, str):
                 texts.append(tuple(rooms))
             elif isinstance(value, tuple):
-                texts.append(
-                    tuple(each.text if isinstance(each, Option) else as_text(each) for each in value)
-                )
+                some = (each.text if isinstance(each, Option) else as_text(each) for each in value)
+                texts.append(tuple(some))
             else:
                 texts.append((as_text(value),))
         return cls(row.name, tuple(texts), place)
