@@ -59,7 +59,7 @@ class Monitor:
         """
         mask = self._machine.mask(event, self._seen)
         if self._masks is not None and mask not in self._masks:
-            raise ValueError("the event is not in the monitor's list of possible events")
+            raise ValueError(f"{event.kind} {event.text[:50]!r} is like none in the list of possible events")
         self._state, self.holds = self._machine.step(self._state, mask)
         self._seen += 1
         return self.holds
@@ -92,7 +92,7 @@ class _Machine:
         return found
 
     def step(self, state: Any, mask: int) -> tuple[Any, bool]:  # noqa: ANN401 - as in Machine
-        """Look up or compute the next state for an event's `mask`, and whether the formula holds in it."""
+        """Return the state after an event, given the patterns it matches, and whether the formula holds."""
         known = self.steps.get((state, mask))
         if known is not None:
             return known

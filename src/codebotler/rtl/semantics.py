@@ -33,11 +33,7 @@ class Inconclusive(Exception):  # noqa: N818 - a third verdict, not a mistake of
 
 
 def holds(formula: formulas.Formula, trace: Trace) -> bool:
-    """Whether a formula holds on a trace.
-
-    Raises:
-        Inconclusive: the formula depends on an option that is not a string.
-    """
+    """Whether a formula holds on a trace. Raise Inconclusive if it depends on a non-string option."""
     if isinstance(formula, formulas.Not):
         return not holds(formula.part, trace)
     if isinstance(formula, formulas.And):
@@ -64,7 +60,7 @@ def _test_holds(test: formulas.Test, trace: Trace) -> bool:
 
 
 def positions(test: formulas.PresenceTest, trace: Trace) -> Iterable[int]:
-    """Return the positions where a matching event would make a test hold; for `Last`, only the last one."""
+    """Return the positions in a trace where a test looks for an event; only the last one for `Last`."""
     span = positions_in_scopes(test.stay if isinstance(test, formulas.ActAtFirst) else test.scopes, trace)
     if isinstance(test, formulas.ActAtSome):
         return during_stays(test, trace, span)

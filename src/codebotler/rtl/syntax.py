@@ -55,7 +55,7 @@ def parse(
         skills: the skills whose events the formula may name.
         means: words for explanations, by kind of event: what its texts mean, such as `that nobody is coming`
             for `say`. Answered questions have the key `answered`.
-        sets: the names in each set that texts may contain in braces; None if braces have no such meaning.
+        sets: the names in each set, for texts such as `{stoves}`; None if braces do not mean sets.
 
     Raises:
         RtlSyntaxError: the text is not a formula.
@@ -125,7 +125,7 @@ class _Parser(FormulaSource):
         return formulas.Exists(wanted, (formulas.Scope("AfterLast", opposite),))
 
     def state(self, name: str, node: ast.Call) -> formulas.Formula:
-        """Parse a state test such as `on("stove")`. For a named set, any of its things may have the state."""
+        """Parse a state test such as `on("stove")` or, for any thing in a set, `on("{stoves}")`."""
         (thing,) = self.arguments(node, node, name, 1)
         things = [thing]
         match thing:
@@ -133,9 +133,9 @@ class _Parser(FormulaSource):
                 names = map(_escaped, self.names_in(tag[1], thing))
                 things = [ast.copy_location(ast.Constant(each), thing) for each in names]
             case ast.Constant(str(text)) if not THING_NAME.fullmatch(text):
-                raise self.expected("a string that names one thing", thing)
+                raise self.expected(f'a string that names one thing, as in {name}("stove")', thing)
             case ast.Call():
-                raise self.expected("a string that names one thing", thing)
+                raise self.expected(f'a string that names one thing, as in {name}("stove")', thing)
         return _joined(formulas.Or, [self.is_in_state(name, each) for each in things])
 
     def is_in_state(self, name: str, thing: ast.expr) -> formulas.Formula:

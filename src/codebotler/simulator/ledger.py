@@ -47,7 +47,7 @@ class SkillPerformer(Protocol):
 
 
 def run_parameters(robot: SkillPerformer) -> tuple[int, float, float, float, bool]:
-    """Return fuel, seconds so far, time limit in seconds, clock start (Unix time), and if time is real."""
+    """Return step limit, seconds so far, time limit (seconds), clock start (Unix time), if time is real."""
     settings, limits = robot.settings, robot.settings.limits
     return limits.ticks, robot.now, limits.seconds, settings.clock_starts.timestamp(), robot.is_live
 

@@ -113,7 +113,7 @@ class WorkerPool:
 
     @property
     def is_here(self) -> bool:
-        """Whether the calling thread is a pool thread, which must not wait for another pool thread."""
+        """Whether the calling thread belongs to this pool. If so, waiting for the pool could deadlock."""
         return getattr(self._local, "is_ours", False)
 
     def call(self, function: Callable[[], _Value]) -> _Value:

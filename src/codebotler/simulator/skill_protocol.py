@@ -70,7 +70,7 @@ class SkillProtocol:
         return self.ledger.outcome_at_end(final or {})
 
     def talk(self) -> dict[str, object] | None:
-        """Answer requests. Return the child's last message, which says how the run ended, or None."""
+        """Answer requests until the run ends. Return the process's final message, or None if it has none."""
         if self.child.receive() is None:
             raise LostProcessError("a process exited before it was isolated; memory may have run out")
         overrun = 0
@@ -83,7 +83,7 @@ class SkillProtocol:
                 case [str() as name, list() as values, int() | float() as now, int() as line]:
                     pass  # from a live program; only for display, since it may be false
                 case _:
-                    raise ProtocolError("the child sent a request that is not a skill call")
+                    raise ProtocolError("a request is not a list of skill, arguments and time")
             if self.robot.is_live:
                 self.robot.line = line if type(line) is int and 0 < line <= MAX_LINE else None
             self.child.send((*self._answer(name, values, now), self.robot.now))
@@ -111,7 +111,7 @@ class SkillProtocol:
             case "too-long", _:
                 self.ledger.limit = too_long(self.limits)
             case _:
-                raise ProtocolError("the child requested a skill that does not exist")
+                raise ProtocolError("a request names a skill that does not exist")
         return STOP
 
 
@@ -145,7 +145,7 @@ def _option(value: object) -> Option:
         case [str(text), bool(is_text)]:
             return Option(text, is_text)
         case _:
-            raise ProtocolError("the child sent an invalid option of a question")
+            raise ProtocolError("an option of a question is not a pair of text and boolean")
 
 
 def named_arguments(skill: Skill, given: Mapping[str, object]) -> list[Argument]:

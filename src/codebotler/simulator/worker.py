@@ -102,7 +102,7 @@ class Worker:
     # --- several tame programs in one child
 
     def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
-        """Run the tame programs. Return outcomes by job and robot index; the caller must run missing ones."""
+        """Run the programs that may share a process. Return all known outcomes by job and robot index."""
         known: dict[tuple[int, int], Outcome] = {}
         if self._one_process_per_run or not jobs:
             return known
@@ -197,7 +197,7 @@ class Worker:
         return outcome
 
     def run_on(self, source: str, robot: SimulatedRobot) -> Outcome:
-        """Run a program on this robot. Never repeat the run: raise EngineError if a process is lost."""
+        """Run a program on this robot, without retries. Raise EngineError if the process is lost."""
         robots = [robot]
 
         def only_robot() -> SimulatedRobot:

@@ -18,7 +18,7 @@ WORDS_FOR_ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody
 
 
 def absent_names(requirement: Requirement, scenario: Scenario, task: Task) -> Iterator[tuple[str, str]]:
-    """Yield kind and name of what a requirement mentions but its world lacks, such as `("room", "lab")`."""
+    """Yield what a requirement mentions but its world lacks: kind and name, such as `("room", "lab")`."""
     for category, name, known in _names(requirement, scenario.world, task):
         if not may_mean(name, known):
             yield category, name

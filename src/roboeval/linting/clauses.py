@@ -17,10 +17,10 @@ Span = tuple[int, int]
 
 
 def uncovered_clauses(task: Task) -> Iterator[tuple[int, str]]:
-    """Yield the index of a prompt and a clause in it, for each clause that no check covers.
+    """Yield each clause of the task's prompts that no check covers, after the index of its prompt.
 
-    A clause is covered if a requirement quotes one of its words. It is also covered if a regex of a fact in
-    `covered_by` matches one of its words, not counting words that `.*` matches.
+    A requirement covers each clause from which it quotes a word. A fact in `covered_by` covers each clause
+    in which its regex matches a word. Parts such as `.*`, which match any word, do not count.
     """
     for number, prompt in enumerate(task.prompts):
         text = " ".join(prompt.split())

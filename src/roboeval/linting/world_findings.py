@@ -124,7 +124,7 @@ class JudgedWorld:
                     yield self.finding("dead-regex", subject, message, line)
 
     def by_prompt(self) -> list[JudgedWorld]:
-        """Return a copy of the world for each distinct set of requirements that a prompt asks for."""
+        """Return a copy of this world for each prompt, with only its requirements. Omit duplicates."""
         asked = {self.scenario.asked_by(prompt): None for prompt in range(len(self.task.prompts))}
         return [replace(self, scenario=scenario) for scenario in asked]
 
@@ -136,7 +136,7 @@ class JudgedWorld:
 
 
 def judged_worlds(task: Task, matching: Matching = "label-in-request") -> Iterator[JudgedWorld]:
-    """Yield the worlds of a task, then those of its ablation (only requirements of common sense)."""
+    """Yield the worlds of a task, then those of its ablation, which require only common sense."""
     for ablated in (False, True):
         for number, scenario in enumerate(task.judged_in(ablated=ablated), 1):
             yield JudgedWorld(task, number, scenario, ablated, matching)

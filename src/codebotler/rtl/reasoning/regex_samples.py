@@ -79,7 +79,7 @@ def _spell_in_all_ways(tree: Tree) -> list[str]:
 
 
 def spell_out(tree: Tree, gap: str = "") -> list[str]:
-    """Return some strings that a parsed regex matches, with `gap` wherever it allows any character."""
+    """Return a few strings that a parsed regex matches. Parts that match any text, as `.*`, become `gap`."""
     texts = [""]
     for op, arguments in tree:
         parts = _spell_node(op, arguments, gap)

@@ -76,7 +76,7 @@ def transcripts(
     batch: Batch,
     send: Callable[[list[bytes]], None] = len,  # type: ignore[assignment]  # a rehearsal sends nothing
 ) -> None:
-    """Run a batch of programs, each in all its worlds. Pass transcripts to `send`; by default, drop them."""
+    """Run each program of a batch in its worlds with `run`, and `send` a record of each run's calls."""
     skills, elsewhere, pickled, programs = batch
     if skills != run.skills:
         run.provide(skills)
@@ -108,7 +108,7 @@ class TranscribedRun(ProgramRun):
         self.provided.update(time=sys.modules["time"], __builtins__=self.builtins)
 
     def transcript(self, code: CodeType, kind: str, arguments: tuple[Any, ...]) -> bytes:
-        """Run a program on the robot `ROBOTS[kind](*arguments)`. Return a transcript, or `null` to retry."""
+        """Run a program on the robot `ROBOTS[kind](*arguments)`. Return the run's record; `null` to rerun."""
         self._reset(ROBOTS[kind](*arguments))
         sys.setrecursionlimit(BATCH_RECURSION_LIMIT)
         end = self.execute(code, run_parameters(self.ledger.robot))
@@ -157,7 +157,7 @@ class TranscribedRun(ProgramRun):
             raise LimitReachedError
 
     def request(self, request: str) -> NoReturn:  # noqa: ARG002 - as in ProgramRun
-        """End the run, since its simulated time is up. Programs in batches make no other request."""
+        """End the run. In a batch, the only request is a `sleep` past the limit of simulated time."""
         self._let_time_pass()
         raise LimitReachedError
 

@@ -23,7 +23,7 @@ Programs: TypeAlias = Sequence[tuple[bytes, Sequence[SimulatedRobot]]]
 
 
 class Call(NamedTuple):
-    """A program's skill call, and the answer of the robot's copy in the child."""
+    """A skill call, and the answer that the program got from the copy of the robot in its process."""
 
     skill: str
     arguments: tuple[Scalar | tuple[Option | Scalar, ...], ...]
@@ -33,7 +33,7 @@ class Call(NamedTuple):
 
 
 class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
-    """A child's report on a run: the program's skill calls, and how it ended."""
+    """A process's record of one run of a program: its skill calls with their answers, and how it ended."""
 
     calls: list[Call]
     now: float  # the time on the clock when the report was written
@@ -50,7 +50,11 @@ TRANSCRIPT_DECODER = msgspec.json.Decoder(Transcript | None)
 def message(
     programs: Programs,
 ) -> tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
-    """Return a batch for a child: skills, those that the engine runs, robots, code with robot indexes."""
+    """Return the message that sends a batch of programs to the process that runs them.
+
+    It consists of all skills, the names of those that only the engine can execute, the pickled robots, and
+    each program's code with the indexes of its robots.
+    """
     robot = programs[0][1][0]
     setups: dict[tuple[int, ...], Setup] = {}
     keyed = []
@@ -85,12 +89,12 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
         answer = replay.follow(transcript)
         if replay.ledger.broken is not None:
             if transcript.end is None:
-                raise ProtocolError("a rule has ended the run, but the child waits for an answer to continue")
+                raise ProtocolError("a rule has ended the run, but the program's process tries to go on")
             return None  # repeat the run in its own process, to learn at which line the rule ended it
         if transcript.end is not None:
             outcome = judge_end(replay.ledger.outcome_at_end(transcript.end), robot)
             if outcome.status is Status.KILLED:
-                raise ProtocolError("the child did not report correctly how the run ended")
+                raise ProtocolError("the program's process sent an invalid report on how the run ended")
             if key is not None:
                 if len(REPLAYED) >= MAX_REPLAYS:
                     REPLAYED.clear()
@@ -120,11 +124,11 @@ def parse_transcript(frame: bytes) -> Transcript | None:
     try:
         return TRANSCRIPT_DECODER.decode(frame)  # type: ignore[no-any-return]  # the decoder returns this type
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        raise ProtocolError("the child sent an invalid transcript") from None
+        raise ProtocolError("the program's process sent an invalid record of a run") from None
 
 
 class Replay:
-    """Repeats a transcript's skill calls on the engine's own robot, and compares the answers."""
+    """Checks the record of a run: repeats its skill calls on the engine's robot, and compares the answers."""
 
     def __init__(self, robot: SimulatedRobot) -> None:
         self.robot, self.ledger = robot, RememberingLedger(robot)
@@ -134,28 +138,28 @@ class Replay:
         """Repeat a transcript's calls. Return the last answer. Raise ProtocolError if any answer differs."""
         calls = [self._expected(call) for call in transcript.calls]
         if transcript.end is None and (not calls or calls[-1][-1] is not None):
-            raise ProtocolError("the child's transcript has neither an end nor an unanswered call")
+            raise ProtocolError("the record of a run has neither an end nor an unanswered skill call")
         ledger = self.ledger
         answer: SkillAnswer = ("ok", None)
         for skill, arguments, now, expected in calls:
             if now != self.robot.now:
                 self._let_time_pass(now)
             if ledger.limit is not None:
-                raise ProtocolError("the child's transcript has skill calls after the run reached a limit")
+                raise ProtocolError("the record of a run has skill calls after the run reached a limit")
             answer = ledger.perform(skill, arguments)
             if ledger.broken is not None:
                 return answer
             if expected is not None and expected != (
                 answer if answer[0] != "error" else ("error", answer[1][1:])
             ):
-                raise ProtocolError("the child's robot and the engine's robot gave different answers")
+                raise ProtocolError(f"{skill} answered differently in the program's process and the engine")
         if transcript.end is not None:
             self._let_time_pass(transcript.now)
         return answer
 
     def _let_time_pass(self, now: float) -> None:
         if now < self.robot.now:
-            raise ProtocolError("the child's transcript has a time that is earlier than the one before it")
+            raise ProtocolError("the record of a run has a time that is earlier than the one before it")
         if self.ledger.limit is None:
             self.ledger.let_time_pass(now)
 
@@ -164,9 +168,9 @@ class Replay:
         skill = self.robot.skills.get(call.skill)
         known = () if skill is None else skill.parameters
         if skill is None or len(known) != len(call.arguments) or not all(map(_fits, known, call.arguments)):
-            raise ProtocolError(f'a transcript contains an invalid call of the skill "{call.skill[:100]}"')
+            raise ProtocolError(f'the record of a run has an invalid call of the skill "{call.skill[:100]}"')
         if call.kind == "ask" and call.skill not in self._own:
-            raise ProtocolError("the child asks the engine to execute a skill that it must execute itself")
+            raise ProtocolError(f"the program's process must execute {call.skill} itself, not ask the engine")
         value = tuple(call.value) if call.kind == "error" and isinstance(call.value, list) else call.value
         arguments: Any = call.arguments  # checked above
         return call.skill, arguments, call.now, None if call.kind == "ask" else (call.kind, value)

@@ -227,7 +227,7 @@ class RuleGuard:
                 self.judge_result(event)
 
     def give_up(self, rules: Iterable[Rule], event: Event) -> None:
-        """Stop judging these rules, since the event's room is unknown. Raise an error if one is `always`."""
+        """Stop judging these rules because the event's room is unknown. Raise an error for `always` rules."""
         for rule in rules:
             self._history.unjudged.add(rule.name)
             if rule.when == "always":

@@ -23,7 +23,7 @@ STATUSES = {"TimeoutError": Status.TIMEOUT, "MemoryError": Status.PYTHON_ERROR} 
 
 @dataclass(frozen=True)
 class CompiledProgram:
-    """A program's compiled code, and whether the program may share a process with others (is tame)."""
+    """A program's compiled code, and whether it may run in a process that it shares with other programs."""
 
     code: bytes  # marshalled; only a child may unmarshal it
     is_tame: bool  # whether it leaves nothing behind for later runs in its process
@@ -78,8 +78,8 @@ def _compile_all(
 def compile_here(source: str, literals: str, skills: frozenset[str]) -> tuple[str, str, int | None]:
     """Compile a program in this process, which must be a closed process if the text is untrusted.
 
-    Return CODE, the code in base64, and whether the program is tame; or the kind, message and line of an
-    error. Raise MemoryError if the program, or an earlier one, used up the memory.
+    Return CODE, the code in base64, and whether the program may share a process; or the kind, message and
+    line of an error. Raise MemoryError if the program, or an earlier one, used up the memory.
     """
     try:
         code, is_tame = prepared(source, lowercase=literals == "lowercase", skills=skills)

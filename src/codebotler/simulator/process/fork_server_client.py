@@ -119,7 +119,7 @@ class ForkServer:
 
 
 class BatchServer(ForkServer):
-    """Starts a fork server for batches of tame (simple) programs. It forks each child in advance."""
+    """Starts a fork server for programs that may share a process. It forks each child in advance."""
 
     def __init__(self) -> None:
         self._next: IsolatedProcess | None = None

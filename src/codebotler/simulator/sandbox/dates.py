@@ -7,7 +7,7 @@ import time
 
 
 class StandIn(type):
-    """Metaclass of the simulated `date` and `datetime`, whose instances include objects of the originals."""
+    """Metaclass of the simulated `date` and `datetime`: `isinstance` accepts real dates as well."""
 
     def __instancecheck__(cls, thing: object) -> bool:
         if cls in (date, datetime):
@@ -56,7 +56,7 @@ class datetime(real.datetime, metaclass=StandIn):  # noqa: N801 - the name of th
 
 
 def simulate_dates() -> None:
-    """Replace `date` and `datetime` in the module `datetime` by the classes of this module."""
+    """Replace `datetime.date` and `datetime.datetime` with versions that use the simulated clock."""
     for fake in (date, datetime):
         fake.__module__, fake.__qualname__ = "datetime", fake.__name__
         setattr(real, fake.__name__, fake)

@@ -178,7 +178,7 @@ class ProgramRun:
     def perform(
         self, name: str, parameters: list[tuple[type | str, ParameterDescription]], values: tuple[Any, ...]
     ) -> Any:  # noqa: ANN401 - a skill may return any type
-        """Execute a skill. Raise TypeError or ValueError for wrong arguments, even subclasses of `str`."""
+        """Execute a skill. Raise TypeError or ValueError for wrong arguments, and for subclasses of `str`."""
         for (kind, parameter), value in zip(parameters, values, strict=True):
             given: type = type(value)
             if given is not kind:

@@ -53,7 +53,7 @@ def get_ready() -> tuple[socket, ProgramRun, Callable[[ProgramRun], None], Filte
 def serve(
     door: socket, run: Run, execute: Callable[[Run], None], seccomp: Filter | None, seconds: int
 ) -> None:
-    """Fork a child for each request of the engine at the `door`, one at a time, until the engine hangs up.
+    """Fork a child for each request on the socket `door`, one at a time, until the engine hangs up.
 
     Each child calls `execute` with `seccomp` in force and `seconds` of processor time.
     """

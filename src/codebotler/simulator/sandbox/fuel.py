@@ -31,7 +31,7 @@ SCOPE_NODES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 def prepared(
     source: str, *, lowercase: bool, skills: frozenset[str] | None = None
 ) -> tuple[types.CodeType, bool]:
-    """Compile a program so that it counts steps. Also return whether it is tame (False without `skills`)."""
+    """Compile a program to count its steps. Also return if it may share a process (not without `skills`)."""
     if "\0" in source:
         line = source.count("\n", 0, source.index("\0")) + 1
         raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))

@@ -67,7 +67,7 @@ OWN_SCOPES = (ast.FunctionDef, ast.Lambda, ast.ListComp, ast.DictComp, ast.Gener
 
 
 class WildError(Exception):
-    """Raised if a program contains a construct that is not on the allowlist: the program is wild."""
+    """Raised for a program that needs its own process, since it has a construct not on the allowlist."""
 
 
 def wild(*_: object) -> NoReturn:

@@ -26,7 +26,7 @@ class Thing:
         return Entity(self.label if self.is_pattern else re.escape(self.label), self.traits)
 
     def is_meant_by(self, request: str, matching: Matching = "label-in-request") -> bool:
-        """Return whether a request, such as "the red mug", refers to this thing."""
+        """Return whether a request such as "the red mug" means this thing. `matching` is set by the suite."""
         if matching == "longest-name":
             return bool(best_fits(request, [self.entity]))
         if self.is_pattern:

@@ -68,7 +68,7 @@ class FactSampler:
 
 @dataclass(frozen=True)
 class Draw:
-    """A chosen fact: method and arguments for `FactSampler.decide`, and the result (a position or bool)."""
+    """A random decision: what `FactSampler.decide` was asked, and the result (an index or bool)."""
 
     method: DrawMethod
     arguments: tuple[Any, ...]
@@ -76,10 +76,10 @@ class Draw:
 
     @property
     def alternatives(self) -> list[Draw]:
-        """Copies of this fact, one per other possible result."""
+        """Copies of this decision, one for each result that it could have had instead."""
         results = (True, False) if self.method == "is_there" else range(self.arguments[0])
         return [replace(self, result=result) for result in results if result != self.result]
 
     def holds_in(self, sampler: FactSampler) -> bool:
-        """Return whether this fact has the same result in the world of another sampler."""
+        """Return whether this decision has the same result in the world of another sampler."""
         return sampler.decide(self.method, *self.arguments).result == self.result

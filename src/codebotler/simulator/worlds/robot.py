@@ -72,7 +72,7 @@ class SimulatedRobot(SimulatedWorld):
 
     @property
     def own_skills(self) -> tuple[str, ...]:
-        """The names of skills, such as custom ones, that a copy of this robot in a child cannot execute."""
+        """The skills, such as custom ones, that a copy of this robot in another process cannot execute."""
         if "is_copied" not in vars(type(self)):
             return tuple(self.skills)
         if self.skills is SKILLS:

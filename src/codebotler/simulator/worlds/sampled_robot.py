@@ -219,7 +219,7 @@ class SampledRobot(SimulatedRobot):
         return options[self._draw("answer", len(options), agreeing, *question)]
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], errors: Sequence[str] = ()) -> int:
-        """Choose a statement's outcome at random on first use. Return its position in `outcomes + errors`."""
+        """Choose an outcome or error of a statement at random, once per run. Return its index."""
         possible = [*outcomes, *errors]
         if statement not in self.outcomes:
             drawn = self.outcomes[statement] = self._draw("outcome", len(possible), statement)
@@ -280,7 +280,7 @@ class SampledRobot(SimulatedRobot):
         return [] if means_anybody(entity) or meant_by(entity, known, plain=True) else fitting
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return things in the room `where` (default: anywhere) that fit `is_`, at random."""
+        """Return things that fit `is_` in the room `where` (default: anywhere). What is there is random."""
         return self._all_of(self.room_map.things, where, is_ or "thing", is_person=False)
 
     def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:
@@ -342,7 +342,7 @@ class SampledRobot(SimulatedRobot):
         self.explored[goal].people |= {who, SOMEBODY}
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Return a random option's index. With no prior look, the person is here (random if strict)."""
+        """Return a random option's index. With no prior look, assume the person is here, unless strict."""
         person, options = as_text(person), to_options(options)
         who = normalized(person)
         if not options or not self._answers(who):

@@ -204,7 +204,7 @@ class SimulatedWorld:
         return known
 
     def known_names(self, sort: Literal["room", "thing", "person"]) -> Sequence[str]:
-        """Return the names of all rooms, things or people in this world, without those that are regexes."""
+        """Return the names of all rooms, or of the things or people whose name is not a regex."""
         if sort == "room":
             return self.rooms
         if sort == "thing":
@@ -214,7 +214,7 @@ class SimulatedWorld:
         return plain_names(labels)
 
     def draw_outcome(self, statement: str, outcomes: Sequence[str], _errors: Sequence[str] = ()) -> int:
-        """Choose a statement's outcome at random, always the same in a given world. Return its position."""
+        """Choose an outcome of a statement at random, always the same in one world. Return its index."""
         return self._sampler.draw(len(outcomes), statement)
 
     @cached_property
