@@ -6,6 +6,7 @@ import re
 from abc import ABC, abstractmethod
 from importlib import import_module
 from typing import Any
+from unicodedata import is_normalized
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.text.labels import scope_flags
@@ -37,8 +38,9 @@ def quote(text: str) -> str:
     if "\\" in text and '"' not in text and text.isprintable():
         # No regex ends with a single backslash, so the closing quote is safe.
         return f'r"{text}"'
-    # A single quote makes `repr` choose double ones.
-    return repr(text) if '"' in text else '"' + repr("'" + text)[2:]
+    # An accent after an escape would change it. A single quote makes `repr` and `ascii` choose double ones.
+    show = repr if is_normalized("NFC", repr(text)) else ascii
+    return show(text) if '"' in text else '"' + show("'" + text)[2:]
 
 
 class Matcher(ABC):

@@ -107,6 +107,7 @@ def test_strange_texts_survive_printing(strange_formulas: SearchStrategy[Formula
 
 @pytest.mark.filterwarnings("ignore::FutureWarning")
 @example(r"a\\d")
+@example("\x8a\u0300")
 @given(st.text(max_size=8).map(lambda text: unicodedata.normalize("NFC", text.replace("\b", ""))))
 def test_raw_patterns_survive_printing(pattern: str) -> None:
     try:
