@@ -1,5 +1,5 @@
 # Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
-# installed (this folder, or a wheel), VENV where, EXTRAS with which extras.
+# installed (this folder, or a wheel), VENV where, EXTRAS with which extras, PROCESSES how many processes run tests.
 #
 #   make test       what to run before each commit, with the tutorial of custom skills; TESTS names what to run instead. At
 #                   its end it lists the ten tests that took the most processor time; one above 0.1 s is marked slow
@@ -34,6 +34,7 @@ ENVIRONMENTS = trl verifiers openenv
 ENVIRONMENTS_IN ?= .
 environment = $(abspath $(ENVIRONMENTS_IN))/.venv-$(1)/bin/python
 FUZZ_EXAMPLES ?= 5000
+PROCESSES ?= 2
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
 # Said before anything is made, since pip says it only after an environment is there to stay.
@@ -72,7 +73,7 @@ serve: $(VENV)/installed
 	@$(BIN)/codebotler serve --world examples/office.yaml --speed 5
 
 test: $(VENV)/tested
-	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m "not slow" $(addprefix --ignore ,$(APART)) $(TESTS)
+	$(BIN)/python -m pytest --numprocesses $(PROCESSES) --dist worksteal -m "not slow" $(addprefix --ignore ,$(APART)) $(TESTS)
 	$(if $(TESTS),,$(BIN)/python -m pytest tests/guide/test_pages.py -k own-skills)
 
 test-all: test test-slow test-suites test-guide test-ros1 test-ros2 test-browser test-faulty-server test-transformers test-pyrobosim \
@@ -82,10 +83,10 @@ test-slow: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m slow $(addprefix --ignore ,$(APART))
 
 test-suites: $(VENV)/tested
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup tests/suites
+	$(BIN)/python -m pytest --numprocesses $(PROCESSES) --dist loadgroup tests/suites
 
 test-guide: $(VENV)/tested
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup tests/guide
+	$(BIN)/python -m pytest --numprocesses $(PROCESSES) --dist loadgroup tests/guide
 
 test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 3 tests/ros1
@@ -96,7 +97,7 @@ test-ros2: $(VENV)/tested $(ROS2_VENV)-kilted/made $(ROS2_VENV)-jazzy/made
 	$(call ros2,jazzy) -m smoke tests/ros2
 
 test-browser: $(VENV)/tested
-	$(BIN)/python -m pytest --no-skips --numprocesses 2 --dist loadfile $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
+	$(BIN)/python -m pytest --no-skips --numprocesses $(PROCESSES) --dist loadfile $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
 
 pictures: $(VENV)/tested
 	@shots=$$(mktemp -d) && \

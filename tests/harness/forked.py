@@ -16,8 +16,11 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Any, Self
+from typing import IO, TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # the Python of a robot on ROS, which forks nodes, may be an old one
+    from types import TracebackType
+    from typing import Self
 
 PAGE = ("codebotler.web.server", "roboeval.web.pages")
 """What a page needs besides, and other commands do not."""
@@ -44,6 +47,7 @@ class Forked:
         stderr: a file for what it says beside them; a pipe by default.
         preload: modules that are imported before it is forked, once for all.
         server: the process from which it is forked; one for all by default.
+        own_session: whether it leads a session of its own.
     """
 
     def __init__(
@@ -55,6 +59,7 @@ class Forked:
         stderr: IO[str] | None = None,
         preload: Sequence[str] = PROGRAMS,
         server: Server | None = None,
+        own_session: bool = False,
     ) -> None:
         self._server = server or SERVER
         theirs, given = os.pipe()
@@ -65,7 +70,8 @@ class Forked:
         self.stderr = None if said is None else os.fdopen(said, encoding="utf-8")
         job = {"words": [name, *map(str, arguments)], "cwd": str(cwd), "env": dict(environment)}
         handed = (theirs, to_out, to_err)
-        self.pid: int = self._server.ask({**job, "preload": list(preload)}, handed)
+        more = {"preload": list(preload), "own_session": own_session}
+        self.pid: int = self._server.ask({**job, **more}, handed)
         self.returncode: int | None = None
         for end in handed:
             os.close(end)
@@ -130,10 +136,14 @@ class Server:
 
     Args:
         missing: packages that cannot be imported there, as if they were not installed.
+        command: what starts it, without the descriptor that follows.
     """
 
-    def __init__(self, missing: Sequence[str] = ()) -> None:
+    def __init__(
+        self, missing: Sequence[str] = (), command: Sequence[str] = (sys.executable, __file__)
+    ) -> None:
         self._missing = list(missing)
+        self._command = list(command)
         self._lock = threading.Lock()
         self._line: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
@@ -156,7 +166,7 @@ class Server:
         with theirs:
             for end in (self._line, theirs):
                 end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, LONGEST)
-            command = [sys.executable, __file__, str(theirs.fileno()), *self._missing]
+            command = [*self._command, str(theirs.fileno()), *self._missing]
             self._process = subprocess.Popen(command, pass_fds=[theirs.fileno()])
         atexit.register(self.end)
         return self._line
@@ -207,6 +217,8 @@ def become(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
     for standard, number in enumerate(descriptors):
         os.dup2(number, standard)
         os.close(number)
+    if request.get("own_session"):
+        os.setsid()
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # also where the tests were begun with nohup
     os.chdir(request["cwd"])
@@ -216,7 +228,8 @@ def become(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
     sys.stdout = os.fdopen(1, "w", encoding="utf-8")
     sys.stderr = os.fdopen(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1)
     sys.argv = list(request["words"])
-    more = (request["cwd"], *request["env"].get("PYTHONPATH", "").split(os.pathsep))
+    first = str(Path(sys.argv[0]).parent) if sys.argv[0].endswith(".py") else request["cwd"]
+    more = (first, *request["env"].get("PYTHONPATH", "").split(os.pathsep))
     sys.path[:0] = [folder for folder in more if folder and folder not in sys.path]
 
 

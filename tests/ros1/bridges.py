@@ -20,6 +20,7 @@ from codebotler.robots.base import ROS_PYTHON
 from codebotler.robots.ros.caller import calls_data
 from codebotler.robots.ros.connections.connection import default_connection
 from codebotler.robots.ros.worker import WORKERS_FOLDER
+from forked_on_ros import start
 from ros_graph import forget_goals
 
 ROS_SIDE = Path(__file__).parent / "bridge_to_ros.py"
@@ -78,7 +79,7 @@ def ros_handler(
     actions = [action for skill, action in calls_data(default_connection(table)).items() if skill in skills]
 
     def handle(connection: ServerConnection) -> None:
-        with subprocess.Popen(
+        with start(
             [str(ROS_PYTHON), str(ROS_SIDE), str(WORKERS_FOLDER), json.dumps(actions)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

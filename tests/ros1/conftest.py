@@ -10,6 +10,7 @@ import pytest
 from codebotler.robots.base import ROS_PYTHON
 from codebotler.robots.ros.kinds import INSTALL_ROS1, ROS1_MODULES
 from codebotler.robots.ros.worker import find_missing
+from forked_on_ros import forking
 from ros_graph import Graph
 
 HERE = Path(__file__).parent
@@ -35,7 +36,8 @@ def ros_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         patch.setenv("ROS_HOSTNAME", "localhost")
         patch.delenv("ROS_MASTER_URI", raising=False)
         patch.delenv("ROS_IP", raising=False)
-        yield home
+        with forking(str(ROS_PYTHON)):
+            yield home
 
 
 @pytest.fixture

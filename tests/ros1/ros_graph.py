@@ -22,6 +22,7 @@ from codebotler.robots.ros import kinds
 from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
+from forked_on_ros import start
 
 HERE = Path(__file__).parent
 MASTER = HERE / "ros_master.py"
@@ -60,7 +61,7 @@ class Process:
         environment: Mapping[str, str] | None = None,
     ) -> None:
         self.events: queue.Queue[list[Any]] = queue.Queue()
-        self.process = subprocess.Popen(
+        self.process = start(
             [str(python), str(script), *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

@@ -16,6 +16,7 @@ import pytest
 
 from bridges import bridge, ros_handler
 from codebotler.core.skills.paper import SKILLS
+from forked import Forked
 from ros_graph import GO_TO, Graph
 
 FETCH = 'def task_program():\n    go_to("the hall")\n    if is_in_room("mug"):\n        pick("mug")\n'
@@ -50,21 +51,28 @@ def run_tool(
     program: str,
     *options: str,
     robot: str = "ros1",
-    command: Sequence[str] = ("-m", "codebotler"),
-) -> Iterator[subprocess.Popen[str]]:
+    command: Sequence[str] = (),
+) -> Iterator[Forked | subprocess.Popen[str]]:
+    """Start a mission in a process that is forked or, with a command for Python, starts as a whole."""
     (folder / "program.py").write_text(program)
-    with subprocess.Popen(
-        [sys.executable, *command, "run", "program.py", "--robot", robot, "--yes", *options],
-        cwd=folder,
-        env={
-            **os.environ,
-            "PYTHONPATH": str(Path(__file__).parents[2] / "src"),
-            "CODEBOTLER_HOME": str(folder),
-            "ROS_MASTER_URI": graph.uri,
-        },
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
+    words = ("run", "program.py", "--robot", robot, "--yes", *options)
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(Path(__file__).parents[2] / "src"),
+        "CODEBOTLER_HOME": str(folder),
+        "ROS_MASTER_URI": graph.uri,
+    }
+    with (
+        subprocess.Popen(
+            [sys.executable, *command, *words],
+            cwd=folder,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        if command
+        else Forked("codebotler", *words, cwd=folder, environment=environment)
     ) as tool:
         try:
             yield tool

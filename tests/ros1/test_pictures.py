@@ -7,8 +7,6 @@ import io
 import json
 import os
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -30,6 +28,7 @@ from codebotler.robots.ros.caller import Timeouts
 from codebotler.robots.ros.connections.connection_file import read_connection
 from codebotler.robots.ros.robot import RosRobot
 from codebotler.robots.ros.worker import WORKERS_FOLDER
+from forked import Forked
 from halves import encoded, has_frame, rows, sees
 from ros_graph import HERE, LONG, Graph, Process, run_in_thread
 from server import Fault, Server
@@ -141,12 +140,10 @@ def test_mission_keeps_what_the_robot_saw(graph: Graph, tmp_path: Path) -> None:
                    "ROS_MASTER_URI": graph.uri}  # fmt: skip
 
     def tool(*arguments: str) -> str:
-        command = [sys.executable, "-m", "codebotler", *arguments]
-        done = subprocess.run(
-            command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr + done.stdout
-        return done.stdout + done.stderr
+        with Forked("codebotler", *arguments, cwd=tmp_path, environment=environment) as running:
+            out, err = running.communicate()
+            assert running.returncode == 0, err + out
+            return out + err
 
     watched = tool(*command.split(), "--yes")
     for text in ("I see the mug", "no cat"):

@@ -14,6 +14,7 @@ import pytest
 from codebotler.core.skills.paper import SKILLS
 from codebotler.robots.ros.kinds import INSTALL_ROS2, ROS2_MODULES
 from codebotler.robots.ros.worker import find_missing
+from forked_on_ros import forking
 from ros2_scene import PROFILE, ROS2_PYTHON, Scene, installed
 from ros_graph import forget_goals
 
@@ -40,7 +41,8 @@ def ros2_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
         patch.setenv("FASTDDS_DEFAULT_PROFILES_FILE", str(PROFILE))
         actions = [skill.ros for skill in SKILLS.rows if skill.ros is not None]
         installed("robot_actions_pkg", {action.type: action.definition for action in actions})
-        yield
+        with forking(str(ROS2_PYTHON)):
+            yield
 
 
 def lock_free_domain(locks: ExitStack) -> int:
