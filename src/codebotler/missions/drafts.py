@@ -22,7 +22,7 @@ def examine_draft(
     Args:
         program: the program to check.
         view: the session's view, which holds the rules, the rooms and any earlier mission.
-        order: the session's order. If its `drive` replaces this program, its contract is used.
+        order: the session's order. If its `drive` replaces this program, its contract replaces the check's.
         robot: the connected robot.
         is_wanted: returns whether the result is still needed. If not, UnwantedCheckError is raised.
     """

@@ -170,7 +170,7 @@ class Mission:
         """Mark the mission as failed and log why. Raise MissionError while it is running or after its end."""
         with self._writing:
             if self.state.is_moving:
-                raise MissionError(f"mission {self.id} is {self.state}; stop the mission instead")
+                raise MissionError(f"mission {self.id} is {self.state} and cannot be marked failed; stop it")
             self._step(MissionState.FAILED, "fail", reason=reason)
 
     def extend_instruction(self, sentence: str) -> None:

@@ -102,7 +102,7 @@ def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
 def expect_enforceable(
     rules: Sequence[Rule], robot: Robot, room_map: RoomMap | None, remark: Callable[[str], None]
 ) -> None:
-    """Raise UserError or NotReadyError if a rule cannot be enforced. Report possible evasions to `remark`."""
+    """Raise UserError or NotReadyError if a rule is not enforceable. Pass ways to evade rules to `remark`."""
     rooms = () if room_map is None else room_map.goals
     for sentence in (one for rule in rules for one in unknown_rooms_in(rule, rooms)):
         raise UserError(sentence)

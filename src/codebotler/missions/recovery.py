@@ -67,7 +67,7 @@ class PriorApproval:
 def is_recoverable(view: SessionView, events: Sequence[LogLine], skills: SkillTable) -> bool:
     """Whether a mission failed because a skill failed, so that a model may write a program for the rest.
 
-    False if the mission called a skill that traces do not record, because a repeated call would go unnoticed.
+    False if the mission called a skill that leaves no record, as the new program might repeat it unnoticed.
     """
     ends = [line for line in events if line["event"] in SKILL_END_EVENTS]
     failed = bool(ends) and ends[-1]["event"] == "error" and view.reason.startswith(f"{ends[-1]['kind']}: ")

@@ -33,7 +33,7 @@ LIMITED_SIMULATION = replace(SIMULATION, limits=Limits())  # nobody waits to sto
 
 @dataclass(frozen=True)
 class RuleEffect:
-    """How a run ended, and the house rule that stopped it or, failing that, the first that refused a step."""
+    """How a run ended, and the house rule that stopped it or else the first rule that refused a step."""
 
     ended: str  # finished, stopped, the kind of the error, or the final state of a logged mission
     rule: str = ""
@@ -44,7 +44,7 @@ class RuleEffect:
 
     @classmethod
     def of(cls, broken: RuleViolationError, ended: str, line: int | None = None) -> RuleEffect:
-        """Return the effect of a broken rule. `ended` says how the run ended, such as `stopped`."""
+        """Describe a broken rule and the run, which ended as `ended` says, such as `stopped`, at `line`."""
         if broken.event is None:
             return cls("finished", broken.rule.name, "at the end")
         when = "late" if broken.is_late else "before"
@@ -113,8 +113,7 @@ def _effect(outcome: Outcome, violations: Sequence[RuleViolationError]) -> RuleE
 def find_log_effect(path: Path, rules: Sequence[Rule], world: World | None, skills: SkillTable) -> RuleEffect:
     """Return the first effect that rules would have had on the mission whose log is at `path`.
 
-    If `world` is None, use the rooms of the map in the log. Raise UserError if the log is invalid, or calls a
-    skill that is not in `skills`.
+    If `world` is None, use the map in the log. Raise UserError if the log is invalid or has unknown skills.
     """
     events = read_log(path)
     try:

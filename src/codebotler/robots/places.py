@@ -165,7 +165,7 @@ def _make_place(
     if polygon and (pose is None or (pose is entry and _find(entry, "x") is None)):
         pose = [sum(parts) / len(polygon) for parts in zip(*polygon, strict=True)]
         if not is_within((pose[0], pose[1]), polygon):
-            raise ValueError("x and y are missing, and the middle of the corners is outside the polygon")
+            raise ValueError("the place needs x and y, because the middle of its corners is not inside it")
     x, y, *turn = _numbers(pose)
     points = [(x, y), *polygon]
     if size is not None:

@@ -238,7 +238,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
 
     @api.get("/robot", tags=["robot"])
     async def robot(once: WhenToAnswer = "now") -> dict[str, Any]:
-        """Return the robot, its skills and the current mission."""
+        """Return the robot, its skills and the mission, either now or once the mission has begun or ended."""
         view = console.view if once == "now" else await console.view_once(over=once == "over")
         return {
             "robot": console.robot.name,

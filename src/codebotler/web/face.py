@@ -58,7 +58,7 @@ def router(console: Console, face: Face) -> APIRouter:
 
     @routes.get("/api/face")
     async def show(once: WhenToAnswer = "now") -> dict[str, Any]:
-        """Return what the robot does, says and asks."""
+        """Return what the robot does, says and asks: now, or once the mission has begun or ended."""
         if once != "now":
             await console.view_once(over=once == "over")
         return face_data(console, face)

@@ -18,7 +18,7 @@ HOLD_WRITE_SECONDS = 2.0
 class HoldFile:
     """A file that exists from a STOP, or the loss of a robot, until a person approves a later mission.
 
-    A write without a new warning means that STOP was pressed. All other processes then call `on_press`.
+    To signal STOP, a process rewrites the file with the same warning. All others then call `on_press`.
 
     Args:
         path: the file, whose text is the warning about a lost robot, or empty.

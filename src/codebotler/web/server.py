@@ -71,10 +71,11 @@ def serve(
     alone_for: float | None = None,
     companion: Companion | None = None,
 ) -> None:
-    """Serve the page until Ctrl-C, which also stops the robot. Without a console, serve `further` pages only.
+    """Serve the page at `place` until Ctrl-C, which also stops the robot of `console`.
 
-    If `alone_for` is given, the robot stops that many seconds after the last operator has closed the page.
-    The page ends when the `companion` ends.
+    Without a console, serve only the `further` pages. `access` holds the tokens of visitors, and `runs` the
+    runs of benchmarks. If `alone_for` is given, the robot stops that many seconds after the last operator
+    has closed the page. If `companion`, a second server, is given, the page ends when it ends.
     """
     with place.listen() as bound, console or nullcontext():
         port = bound.getsockname()[1]

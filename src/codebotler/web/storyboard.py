@@ -92,7 +92,7 @@ def draw_strips(board: Storyboard) -> None:
 
 
 def scenes_reached(strip: Strip, visited: Sequence[str], learned: Sequence[Event]) -> int | None:
-    """Return how many of a strip's drives are done, or None if the robot did or saw something else."""
+    """Return how many drives of an expected run are done, or None if the robot did or saw something else."""
     known = [*takewhile(lambda scene: scene.room != _LEFT_OUT, strip.scenes)]
     expected = [deed.text for scene in known for deed in scene.deeds if deed.kind in {CHECK, ANSWER}]
     actual = [_phrase(one) if one.kind == CHECK else _answer_text(one.answer) for one in learned]
@@ -183,7 +183,7 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
 def scenes(
     steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int | None] = frozenset()
 ) -> tuple[Scene, ...]:
-    """Group steps by room, beginning in `start`. Omit steps of long runs, but none numbered in `needed`."""
+    """Group steps into visits to rooms, from `start` on. Shorten long runs, but keep steps in `needed`."""
     found: list[Scene] = [Scene(shortened(start, _MAX_STEP_TEXT))]
     for is_shown, some in select_steps(steps, needed):
         if not is_shown:

@@ -60,7 +60,7 @@ class Mutant:
 
 
 def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, ...]:
-    """Return the right solutions of a task, followed by further programs, without equal syntax trees."""
+    """Return a task's right solutions, then the `further` programs, without equal syntax trees."""
     right = (Original(one.about, one.program) for one in solutions(task) if one.fails is None or one.right)
     distinct: dict[str, Original] = {}
     for original in chain(right, further):

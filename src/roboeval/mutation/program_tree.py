@@ -79,7 +79,7 @@ def _compiles(program: str) -> bool:
 
 
 def rewrite(node: Node, edit: Edit) -> Node:
-    """Copy a node, with the nodes in it replaced according to `edit`. Put `pass` into a body left empty."""
+    """Copy a node, replacing each inner node that is a key of `edit`. A body left empty gets a `pass`."""
     fields: dict[str, object] = {}
     for name, value in ast.iter_fields(node):
         if isinstance(value, list):

@@ -66,12 +66,12 @@ class MutationScore:
 
     @property
     def score(self) -> float | None:
-        """The share of mutants killed, out of those killed or surviving, or None if there are none."""
+        """The share of killed mutants among those that were killed or survived, or None if there are none."""
         return self._killed_of(MutantStatus.KILLED, MutantStatus.SURVIVED)
 
     @property
     def score_of_all(self) -> float | None:
-        """The share of mutants killed, out of all that change behaviour, or None if there are none."""
+        """Like `score`, but mutants listed as equivalent also count, as if they had survived."""
         return self._killed_of(*CHANGING_STATUSES)
 
     def _killed_of(self, *statuses: MutantStatus) -> float | None:

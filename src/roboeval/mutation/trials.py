@@ -94,7 +94,7 @@ def mutation_worlds(suite: Suite, task: Task, count: int | None, seed: int) -> t
 
 
 def find_failure(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> MutantResult | None:
-    """Return a program's first failure as a killed mutant's result, or None if it passes in each scenario."""
+    """Return a program's first failure, with the status `killed`, or None if it passes in all scenarios."""
     verdicts = map(judge, outcomes, scenarios)
     return next((_killed(verdict) for verdict in verdicts if not verdict.satisfied), None)
 

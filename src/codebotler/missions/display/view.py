@@ -61,7 +61,7 @@ class MissionOrder:
             clean_instruction(self.instruction)
 
     def first_view(self, number: int, rules: tuple[Rule, ...], within: Contract | None) -> SessionView:
-        """Return the initial view of session `number`, with its house `rules` and any limit `within`."""
+        """Return the initial view of session `number`. If given, `within` limits what a program may do."""
         return SessionView(
             number,
             instruction=self.instruction,
@@ -195,7 +195,7 @@ class SessionView:
 
     @property
     def may_be_edited(self) -> bool:
-        """Whether a person can edit the program now. After the session, edits are for a new mission."""
+        """Whether a person can edit the program now. After the session, an edit begins a new mission."""
         if self.is_over or self.is_written:
             return self.is_over
         waits = self.state is None and bool(self.program)  # for the robot; edits are kept until then

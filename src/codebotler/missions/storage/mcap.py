@@ -143,7 +143,7 @@ class _RobotPath:
         self._at: Point | None = None
 
     def messages(self, line: LogLine, at: int) -> Iterator[TopicMessage]:
-        """Yield messages for the rooms if an event has the map, and for the pose if the robot has moved."""
+        """Yield the rooms if an event has a map, and the pose if it has changed. `at` is in ns since 1970."""
         if line["event"] == "map":
             self._world = map_from(line)
             rooms = {"entities": [foxglove.scene_entity(room, at) for room in self._world.rooms]}

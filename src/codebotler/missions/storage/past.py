@@ -72,7 +72,7 @@ class MissionPast:
 
     @property
     def held(self) -> str:
-        """The object in the robot's hand; empty for nothing."""
+        """The object that the robot holds, or "" if it holds nothing."""
         return held_after(self.trace)
 
     @property
@@ -150,13 +150,13 @@ class MissionPast:
         return replace(self, trace=trace, unsure=None, testimony=testimony)
 
     def add_to(self, room_map: RoomMap | None, place: str) -> tuple[RoomMap, str]:
-        """Add these steps to a map. Return it and the robot's room: `place`, or the last known one."""
+        """Return the map with these steps added, and the robot's room: `place` or else the last known one."""
         place = place or self.place
         known = RoomMap((place,), place, guessed=True) if room_map is None else room_map
         return replace(known, start=known.room(place) or known.start, past=self.trace), place
 
     def data(self) -> dict[str, object]:
-        """Return the data of the `past` event, in which the new mission logs these steps."""
+        """Return these steps as data for the `past` event in the log of the new mission."""
         return {
             "continues": self.mission,
             "why": self.why,
@@ -282,7 +282,7 @@ def _has_effect(row: Skill) -> bool:
 
 
 class LoggedRobot(SimulatedRobot):
-    """A simulated robot that replays a mission's log: each skill ends as the event in `end` says."""
+    """A simulated robot that replays a mission's log. Set `end` to the event that ends the next skill."""
 
     def __init__(self, world: World | None, skills: SkillTable) -> None:
         super().__init__(world or World((), ""), SIMULATION, skills)

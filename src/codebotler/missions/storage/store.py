@@ -90,7 +90,7 @@ def recover_missions(home: Path) -> list[MissionSummary]:
 
 
 def find_interrupted(home: Path) -> list[MissionSummary]:
-    """Call `recover_missions`. Return its result, plus the last mission that ran if it was interrupted."""
+    """Return what `recover_missions` returns and, if it was interrupted, the last mission that ran."""
     found = recover_missions(home)
     with suppress(UserError):
         ran = [one for one in read_missions(home, RECENT_MISSIONS) if one.if_tool_dies]

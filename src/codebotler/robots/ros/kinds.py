@@ -78,14 +78,14 @@ def domain_of(address: str = "") -> str:
 
 
 def choose_python(named: Path = ROS_PYTHON) -> Path:
-    """Return `named`, or CodeBotler's own Python if `named` is the default and only our own has ROS 2."""
+    """Return the Python for ROS 2: `named`, or our own if `named` is the default and only our own has it."""
     if named != ROS_PYTHON or find_spec("rclpy") is None:
         return named
     return named if find_missing(named, ROS2_MODULES) == [] else Path(sys.executable)
 
 
 def ros_readiness(name: str, python: Path = ROS_PYTHON) -> Readiness:
-    """Check whether `python` can run the worker for `name` (ros1 or ros2). Ignore the message types."""
+    """Check whether `python` has the modules for `name` (ros1 or ros2). Message types are not checked."""
     if name == "ros1":
         needs: Sequence[str] = ROS1_MODULES
         mend, see = INSTALL_ROS1, "needs a master, see ROS_MASTER_URI"

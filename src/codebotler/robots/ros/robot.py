@@ -50,7 +50,7 @@ class RosRobot(RosCaller):
         return bool(self.connection.pose)
 
     def connect(self) -> None:
-        """Open the detectors and connect. Raise NotReadyError if poses are missing or in the wrong frame."""
+        """Connect over ROS. Raise NotReadyError if no pose arrives, or its frame differs from the places'."""
         self.disconnect()
         if cameras := self.connection.cameras.values():
             from codebotler.perception import open_detector  # noqa: PLC0415 - slow, and optional

@@ -25,9 +25,9 @@ EARLY_ENDS = frozenset({MissionState.FAILED, MissionState.STOPPED, MissionState.
 
 
 class ContinueButton(Button):
-    """A button to continue a mission that ended early. It first asks whether an unsure step happened.
+    """A button to continue a mission that ended early, after asking about any step that may have happened.
 
-    `model` returns the name of the model that writes the rest, or "" for the mission's own model.
+    `model` returns the model to write a program for the remaining steps, or "" for the mission's own model.
     """
 
     def __init__(self, console: Console, mission: str = "", model: Callable[[], str] = str) -> None:
@@ -97,7 +97,7 @@ def has_rest(view: SessionView) -> bool:
 
 
 def is_unfinished(view: SessionView) -> bool:
-    """Return whether the program of this mission itself began to run on the robot, but ended early."""
+    """Return whether a mission ended early, after its own program had begun to run on the robot."""
     return has_rest(view) and view.progress.has_begun
 
 

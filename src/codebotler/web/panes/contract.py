@@ -12,7 +12,7 @@ from codebotler.web.frame import PlainText
 
 
 def draw_contract(skills: SkillTable, contracts: tuple[Contract, Contract | None]) -> None:
-    """Draw the first contract and, if there is a second (the previous draft's), what the first one adds."""
+    """Draw the first contract, and what it adds to the second, which is the previous draft's, if any."""
     contract, earlier = contracts
     PlainText("h3", "What it may do at most")
     sentence = contract_sentence(contract, skills)

@@ -116,7 +116,7 @@ class Access:
 
     @property
     def path(self) -> str:
-        """The secret path of the page, which keeps the page's cookies from servers on other ports."""
+        """The page's secret path prefix. Cookies are limited to it, so servers on other ports get none."""
         return f"/{self._cookie_value('path')[:SECRET_BYTES]}"
 
     def _cookie_value(self, token: str) -> str:

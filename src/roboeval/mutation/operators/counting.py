@@ -68,7 +68,7 @@ def _remembers(node: ast.AST) -> bool:
 
 
 def only_the_last(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that replaces the previous items or sum with the last item instead of adding it."""
+    """Yield each edit that overwrites a sum or list instead of adding to it, such as `n = x` for `n += x`."""
     for node in program.nodes:
         match node:
             case ast.AugAssign(target, ast.Add(), value):

@@ -183,7 +183,7 @@ def say_nothing_of_it(program: ProgramTree, _: Context) -> Edits:
 
 @only_if(TELLING)
 def constant_for_a_value(program: ProgramTree, _: Context) -> Edits:
-    """Yield each edit that replaces a computed value or an answer in a message with a constant."""
+    """Yield each edit that replaces a value in a message with a constant, such as `{count}` with 12."""
     return ({node: _in_place_of(node, value)} for node in _reported(program) for value in (1, 2, 12))
 
 

@@ -15,7 +15,7 @@ Offer = Tuple[str, str, str]  # the kind (action, service, sends or hears), the 
 
 
 class DiscoveryWorker:
-    """Sends all actions, services and topics to CodeBotler in its first message."""
+    """A worker whose first message lists the actions, services and topics of all the robot's nodes."""
 
     def __init__(self, channel: Channel, _start: Fields) -> None:
         channel.send("ready", offers=sorted(find_offers()))

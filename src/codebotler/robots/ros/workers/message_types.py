@@ -68,7 +68,7 @@ def split_type(type_name: str) -> tuple[str, str]:
 
 
 def provider_word(type_name: str) -> str:
-    """Return `action server`, `service` or `subscriber`, whichever a node offers with this type."""
+    """Return what offers a type: `service` for std_srvs/srv/Trigger, or `action server` or `subscriber`."""
     return OFFER_NAMES[type_name.split("/")[1]]
 
 

@@ -137,7 +137,7 @@ def _definitions(folder: Path, wanted: list[str]) -> Definitions:
         try:
             found[name] = path.read_text(encoding="utf-8")
         except OSError:
-            raise SetupError(f"there is no file {path}; complete the folder of {folder.name}") from None
+            raise SetupError(f"there is no file {path}; copy the whole package to {folder}") from None
         types = USED_TYPE.findall(found[name])
         uses = {f"msg/{used}" for package, used in types if package in {"", folder.name}}
         wanted += sorted(uses - {*found, *wanted})
