@@ -48,7 +48,7 @@ class Choice(BaseModel):
 
 
 class StepWord(BaseModel):
-    """A dialog in which a person says whether a step happened if the log does not show it."""
+    """A dialog in which a person says whether the robot completed a step, since the log does not show it."""
 
     answer: Literal["it happened", "it did not happen"] = Field(title="Did this happen?")
 
@@ -84,7 +84,7 @@ def ask_which_behaviour(
 
 
 async def read_last_past(ctx: AgentContext) -> MissionPast:
-    """Return what the mission to continue has done: the last mission, or the one being continued now."""
+    """Return what the mission to continue has done: one already being continued, or else the last mission."""
     gatekeeper, console = gatekeeper_of(ctx), gatekeeper_of(ctx).console
     with as_tool_errors():
         if console.view.past is not None and not console.view.is_over:
@@ -95,7 +95,7 @@ async def read_last_past(ctx: AgentContext) -> MissionPast:
 def ask_whether(
     past: Annotated[MissionPast, Resolve(read_last_past)], ctx: AgentContext
 ) -> Elicit[StepWord] | NotAsked:
-    """Return a dialog that asks whether a step happened; NotAsked if that is known or cannot be asked."""
+    """Return the dialog about an uncertain step; NotAsked if none is uncertain or no dialog is possible."""
     gatekeeper = gatekeeper_of(ctx)
     if past.unsure is None or not gatekeeper.asks_client or not _has_dialogs(ctx):
         return NotAsked()

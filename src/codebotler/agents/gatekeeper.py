@@ -162,7 +162,7 @@ class Gatekeeper:
 
     @contextmanager
     def waiting(self) -> Iterator[None]:
-        """Count a `with` block as a waiting call. Raise MissionError if too many are already waiting."""
+        """In a `with` block, count the current call as waiting. Raise MissionError if too many calls wait."""
         if self._waiting >= MAX_WAITING_CALLS:
             raise MissionError(f"{MAX_WAITING_CALLS} calls are waiting; try again when one has ended")
         self._waiting += 1

@@ -35,8 +35,8 @@ class Behaviour:
     """The part of a run that a person would notice. Visits, looks, waiting and the wording do not count.
 
     Args:
-        said: the room and the claims of the statements between two drives. All statements without claims,
-            such as greetings, are alike.
+        said: for all that is said between two drives, the room and the claims, such as names and numbers.
+            Statements without claims, such as greetings, are all alike.
         moved: for each thing picked up or put down, `pick` or `place`, the thing and the room; sorted.
         asked: the room, the options and the person of each question; case and order do not matter. The
             person is empty unless candidates ask different people in this room.

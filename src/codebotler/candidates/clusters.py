@@ -245,7 +245,7 @@ def run_in_shared_worlds(
 def conflicts_in_worlds(clusters: Sequence[CandidateCluster], people: Container[str] = ()) -> dict[int, int]:
     """Return the number of contradictions in each world where the clusters differ, by the world's number.
 
-    The rooms that chance gives to `people` (normalized names) are taken into account.
+    If chance has put some of `people` (normalized names) into rooms, they count as met there.
     """
     conflicts: dict[int, int] = {}
     for number in range(len(clusters[0].samples)):

@@ -81,7 +81,7 @@ class ClarifyingQuestion:
         sample: the number of the imagined world, from 0.
         rejected: for each candidate that the check rejected, the first problem.
         unwanted: the number of accepted candidates that behave like a refused program.
-        why_last: why no new programs are written after the answer `none`; empty if some are.
+        why_last: why the answer `none` would not lead to new programs; empty if it would.
     """
 
     options: tuple[CandidateOption, ...]

@@ -79,7 +79,7 @@ class ExploringGuard(RuleGuard):
             raise RobotError("SkillFailed", f"the skill {row.name} failed")
 
     def judge(self, *attempts: Event, is_drive: bool = False) -> None:
-        """Record the rules that a possible next event would break, but refuse nothing."""
+        """Record the rules that a possible next event (a drive if `is_drive`) would break. Raise no error."""
         self._keep(self.find_violations(attempts, is_drive=is_drive))
 
     def judge_result(self, event: Event) -> None:
@@ -87,7 +87,7 @@ class ExploringGuard(RuleGuard):
         self._keep(self.add_event(event))
 
     def find_first_unkept(self) -> None:
-        """Record all rules that would be broken if the mission ended now, but return none of them."""
+        """Record all rules that would be broken if the mission ended now. Always return None."""
         self._keep(self.find_unkept())
 
     def _keep(self, found: Iterable[RuleViolationError]) -> None:
@@ -137,7 +137,7 @@ class _Tree:
         self.has_assumed = False  # whether a run took facts for granted
 
     def runs(self) -> Iterator[tuple[Sample, ExploringGuard]]:
-        """Run the program in each world until the budget is spent. Yield each run and its guard."""
+        """Run the program in one world after another, up to a limit. Yield each run with its guard."""
         with self._worker.one_child():
             while self.waiting and min(self._runs_left, self._lone_runs_left, self._calls_left) > 0:
                 count = min(RUNS_AT_ONCE, self._runs_left)

@@ -160,7 +160,7 @@ class CheckResult:
 
     @property
     def vain_runs(self) -> str:
-        """In how many worlds the robot waits or ends without success; empty if in none, or in all of them."""
+        """A note: "in 2 of 5 worlds, the robot waits or ends without success"; empty if in none or in all."""
         count, total = sum(sample.in_vain for sample in self.samples), len(self.samples)
         return f"in {count} of {total} worlds, the robot waits or ends without success" * (0 < count < total)
 

@@ -22,7 +22,7 @@ from codebotler.simulator.worlds.sampled_robot import SampledRobot
 def remaining_outcomes(
     begun: str, room_map: RoomMap, skills: SkillTable, *, first: int = 0, worker: Worker | None = None
 ) -> tuple[Outcome, ...]:
-    """Return what an interrupted program would still do, one outcome per sampled world without failure.
+    """Return what an interrupted program would still do, with one outcome per world where it does not fail.
 
     The result is empty if the program always fails, or does not repeat the steps in `room_map.past`.
 

@@ -83,7 +83,7 @@ def with_repetition_problems(
 def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome] = ()) -> Iterator[Event]:
     """Yield the steps of a trace that the robot has done already, such as the same question in the same room.
 
-    If the trace has more steps of a kind in a room than `remaining`, a step on the same topic also counts.
+    If no run in `remaining` has as many steps of a kind in a room, steps on the same topic count as well.
     """
     done = _distinct(event for event in room_map.past if not event.failed)
     later = _distinct(event for one in remaining for event in one.trace)

@@ -154,7 +154,7 @@ def unexplored_samplers(ran: Sequence[Sample], drew: Sequence[FactSampler]) -> l
 
 
 def first_samplers(settings: CheckSettings) -> list[FactSampler]:
-    """Return the samplers of the random worlds in which every program runs first."""
+    """Return one sampler per random world. A check runs its program in these worlds before any others."""
     return [FactSampler(settings.seed, number, settings.strict) for number in range(settings.samples)]
 
 

@@ -48,7 +48,7 @@ def event_from_step(step: Mapping[str, Any]) -> Event:
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
-    """Return a table of steps, room by room. Steps in `needed` are marked, and the first are always shown."""
+    """Return a table of steps, room by room. Mark the step numbers in `needed`; shorten long traces."""
     table = grid("right", "left")
     if not steps:
         table.add_row(Text(), Text("the robot did nothing", "dim"))
@@ -70,7 +70,7 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 def select_steps(
     steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
 ) -> Iterator[tuple[bool, Sequence[Mapping[str, Any]]]]:
-    """Yield groups of steps as (is shown, steps). A long trace shows its ends and the first `needed`."""
+    """Yield groups as (is shown, steps). A long trace shows its ends and the first steps in `needed`."""
     marked = [step["step"] for step in steps if step["step"] in needed][:MAX_SHOWN_STEPS]
 
     def is_shown(step: Mapping[str, Any]) -> bool:

@@ -237,7 +237,7 @@ def expect_replaceable(path: Path, *beginnings: bytes) -> None:
         with path.open("rb") as file:
             start = file.read(max(map(len, beginnings)))
         if start and not start.startswith(beginnings):
-            raise UserError("unexpected content is not overwritten; remove or rename this file", file=path)
+            raise UserError("this file has unexpected content and is kept; remove or rename it", file=path)
 
 
 # --- the state folder

@@ -223,4 +223,4 @@ def option_from(data: object) -> Option:
             return Option(text)
         case {"no text": str(text)}:
             return Option(text, is_text=False)
-    raise UserError(f'{data!r} is not an option; write a string, or {{"no text": ...}} for anything else')
+    raise UserError(f'{data!r} is not an option of a question; write "yes" or, for 5, {{"no text": "5"}}')

@@ -123,7 +123,7 @@ class YamlFile:
     def validate(self, model: type[FileModel], data: object = None, *, at: YamlPath = ()) -> FileModel:
         """Convert the content to a pydantic model, or raise UserError with the line of a mistake.
 
-        If given, `data` is converted instead. It comes from the path `at` in the file.
+        If given, convert only `data`, which is at the path `at` in the file.
         """
         try:
             return model.model_validate(self.data if data is None and not at else data)

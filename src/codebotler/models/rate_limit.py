@@ -78,7 +78,7 @@ class RateLimited:
     ) -> Reply:
         """Request reply `number`, with retries. Each try passes its text to `on_text` from the beginning.
 
-        Each try runs in a context made by `around`, for example to log when the limits let the try start.
+        Each try runs inside a context manager from `around`, which can log when the try starts, for example.
 
         Raises:
             ModelError: the last try failed.

@@ -145,9 +145,9 @@ def is_recorded(name: str) -> bool:
 
 
 def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
-    """Open `recorded:careful`, `recorded:hasty` or `recorded:FOLDER`. Raise UserError for an unknown name.
+    """Open a model that replays hand-written programs, by its name. Raise UserError for an unknown name.
 
-    The first two also read the solution files in `folder`, if given.
+    `recorded:FOLDER` reads FOLDER; `recorded:careful` and `recorded:hasty` also read `folder`, if given.
     """
     short = name.removeprefix("recorded").removeprefix(":") or RECORDED_NAMES[0]
     if short not in RECORDED_NAMES and Path(short).is_dir():

@@ -85,6 +85,6 @@ def _check_url(url: str) -> None:
         is_valid = parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.port != 0
     if not is_valid or any(mark in url for mark in "@?#"):
         raise UserError(
-            "the base URL must be http:// or https:// with a host and port, as in http://localhost:8000/v1, "
-            "without a user name, password, query or fragment; put keys into the environment"
+            "the base URL must be http:// or https:// with a host and port, as in http://localhost:8000/v1; "
+            "remove any password or query (no @, ? or #), and put keys into the environment"
         )

@@ -56,7 +56,8 @@ def answer_of(reply: str, parses: ParseTest) -> tuple[list[Segment], str]:
     """Split a reply into its answer, as segments of fenced code and text, and its reasoning, as text.
 
     Everything before an unmatched closing marker is reasoning, since the opening marker may be in the prompt.
-    A closing marker at the very end, after other reasoning, is ignored.
+    A closing marker at the very end, after other reasoning, is ignored. `parses` tests if lines are valid
+    Python, which shows where a code block ends.
     """
     segments = [*_segments(_first_turn(reply), parses)]
     answer: list[Segment] = []

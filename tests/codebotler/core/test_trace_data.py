@@ -58,7 +58,7 @@ def test_outcome_data_has_the_fields_of_a_row() -> None:
         (["say", 3], "['say', 3]"),
         (["check", "hi", 1], "[kind, text, true or false]"),
         (["ask", "q", "yes", "a"], "[kind, question, options, answer or null]"),
-        (["ask", "q", [3], "a"], "3 is not an option"),
+        (["ask", "q", [3], "a"], "3 is not an option of a question"),
         ("say hi", "'say hi'"),
     ],
 )

@@ -63,7 +63,7 @@ class PossibleValues:
                 self._bind_parameters(node, self._functions.get(node.func.id))
 
     def variable(self, name: ast.Name) -> str:
-        """Return a key for a variable: its name, plus the position of its comprehension if it has one."""
+        """Return a variable's name. For a comprehension's own variable, add the comprehension's position."""
         return self._own.get(name, name.id)
 
     def of(self, node: ast.expr) -> list[PossibleValue]:

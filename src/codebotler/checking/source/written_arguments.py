@@ -145,7 +145,7 @@ class _Texts:
         return {name: self.texts(given[name]) if name in given else missing for name in names}
 
     def texts(self, node: ast.expr) -> Templates:
-        """Return the possible texts of an expression, or of the elements of a list."""
+        """Return templates for all texts that an expression, or any element of a list, may have."""
         values = self._values.of(node)
         found = NOTHING.union(*(UNKNOWN if value is None else self._texts(value) for value in values))
         return found if len(found) <= MAX_TEMPLATES else UNKNOWN

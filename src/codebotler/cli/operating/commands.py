@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class RunSettings(NamedTuple):
-    """Functions that create the request and the console for `run` and `continue` from their options."""
+    """The functions with which the commands `run` and `continue` create the request and the console."""
 
     request: Callable[..., Request]  # takes the other fields of a request
     open_console: Callable[..., Console]
@@ -35,7 +35,7 @@ def run_settings(
     recover: options.RecoverOption = 0,
     **shared: Any,  # noqa: ANN401 - of several kinds
 ) -> RunSettings:
-    """Return functions that create the request and console for `run` and `continue` with these options."""
+    """Turn the options shared by `run` and `continue` into functions that create the request and console."""
     from functools import partial
 
     from codebotler.cli.operating.run import Request

@@ -12,7 +12,7 @@ TEMPLATE = Path(__file__).with_name("ros_package_template")
 
 
 def ros_packages(skills: SkillTable) -> Mapping[str, Mapping[str, str]]:
-    """Return the files of the ROS 2 packages for skills' actions: texts by package and by path in it."""
+    """Return the ROS 2 packages that define the skills' actions: for each package, its file texts by path."""
     packages: dict[str, dict[str, str]] = {}
     for skill in skills.rows:
         if skill.ros is not None:

@@ -140,7 +140,7 @@ def _one_of(choices: tuple[Any, ...], enum: type[Enum] | None = None) -> ValueTy
 
 
 def sample_values(value: ValueType, names: Sequence[str] = ()) -> tuple[Any, ...]:
-    """Return a few values of a type, as candidates for a random result. If given, `names` are the strings."""
+    """Return a few sample values of a type, such as True and False. Strings come from `names`, if given."""
     if value.is_list:
         some = sample_values(replace(value, is_list=False), names)
         return [some[0]], [], [some[0], some[-1]]

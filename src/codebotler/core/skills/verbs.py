@@ -46,7 +46,7 @@ class Verb:
     object: str = ""  # `{} ml of {} into {}`, used for several texts
 
     def with_object(self, form: str, arguments: Sequence[str], quote: str = '"') -> str:
-        """Add objects to a verb form: `opened "door"`, or `poured 5 ml into cup` if `object` is set."""
+        """Add arguments to a verb form: `opened "door"`, or, if it has a template, `poured 5 ml into cup`."""
         if not self.object:
             return " ".join([form, *(f"{quote}{text}{quote}" for text in arguments)])
         missing = ["something"] * (self.object.count("{") - len(arguments))

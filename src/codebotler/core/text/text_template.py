@@ -68,7 +68,7 @@ class TextTemplate:
 
     @staticmethod
     def excess(templates: Iterable[TextTemplate], allowed: Iterable[TextTemplate]) -> list[TextTemplate]:
-        """Return the templates that no template in `allowed` covers. This is fast without gaps."""
+        """Return the templates that no template in `allowed` covers, such as texts outside a contract."""
         known = [*allowed]
         exact, open_ones = {one.joined for one in known}, [one for one in known if len(one.parts) > 1]
         left = [one for one in templates if one.joined not in exact]

@@ -37,10 +37,9 @@ def compose_fields(frozen: object) -> None:
 
 
 def normalize_text(form: Literal["NFC", "NFD"], text: str) -> str:
-    """Normalize a text, but leave letters with more than 30 accents unchanged.
+    """Convert a text to Unicode form NFC or NFD, but leave letters with more than 30 accents unchanged.
 
-    Python sorts the accents of a letter in quadratic time, and no other thread, such as the one for STOP, can
-    run meanwhile.
+    For these, Python would take so long that it could block other threads, such as the one for STOP.
     """
     parts, end = [], 0
     for start, after in long_rows(text):
