@@ -58,7 +58,7 @@ class RepeatingRobot(SampledRobot):
         self.left = deque(event for event in room_map.past[first:] if not event.failed)
 
     def execute(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Replay the next earlier step, or act after the last one. Raise RobotError if the call differs."""
+        """Replay the next recorded step or, after the last, act. Raise RobotError if the call differs."""
         if not self.left:
             return super().execute(skill, arguments)
         row, past = self.skills[skill], self.left[0]

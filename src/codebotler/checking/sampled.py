@@ -62,7 +62,7 @@ class SampledRuns:
         self.job: Job = program, [partial(self._new_robot, number) for number in range(len(samplers))]
 
     def samples_on(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
-        """Return one sample per different world, reusing the outcomes in `known` (by the world's index)."""
+        """Return a sample per world, but skip repeated runs. `known` has outcomes by the world's index."""
         ran: list[Sample] = []
         for number, sampler in enumerate(self.samplers):
             if number in known:

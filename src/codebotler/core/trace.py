@@ -74,7 +74,7 @@ def attempted_event(
     time: float,
     holding: str = "",
 ) -> Event | None:
-    """Return a call's event without its result, such as `Event("goto", "kitchen")`; None if it has none."""
+    """Return a call as an event without a result: `Event("goto", "kitchen")`; None if it is not recorded."""
     if skill.recording is None:
         return None
     row, given = skill.recording, dict(zip((p.name for p in skill.parameters), arguments, strict=True))

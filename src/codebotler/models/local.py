@@ -45,7 +45,7 @@ class _Job:
         return self.on_text is not None and not self.ending.done()
 
     def pass_on(self, text: str) -> None:
-        """Send the listener the part of `text` that is new to it. Call this on the model's thread."""
+        """Send the listener what is new in `text`, the reply so far. Call this on the model's thread."""
         if self.on_text is not None and self.is_wanted and len(text) > self.passed:
             self.ending.get_loop().call_soon_threadsafe(self.on_text, text[self.passed :])
             self.passed = len(text)

@@ -57,6 +57,6 @@ def location_of(module: str) -> str:
 
 
 def find_object(place: str, name: str) -> object:
-    """Return the object `name` of a module, which is imported from `place` (see `location_of`)."""
+    """Import a module from `place`, as `location_of` returns it, and return its object `name`."""
     module = load_own_module(Path(place)) if place.endswith(".py") else import_module(place)
     return getattr(module, name)
