@@ -101,7 +101,7 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
 def find_first_right(
     worker: Worker, suite: Suite, completions: Iterable[Completion]
 ) -> Iterator[list[Interruption | FaultResult]]:
-    """Yield `find_interruptions` of each completion, but [] once a right program of its task is found."""
+    """Yield `find_interruptions` for each completion, or [] if an earlier one of its task was right."""
     done: set[str] = set()
     for one in completions:
         found = [] if one.task in done else find_interruptions(worker, suite, one)
@@ -171,7 +171,7 @@ def write_continuations(
 
 
 def recovery_data(results: Sequence[FaultResult]) -> dict[str, int | float | None]:
-    """Return counts of missions and steps, and shares of continued missions, or None if there are none."""
+    """Count missions and steps. Also return shares of the continued missions, each None if there are none."""
     ends = Counter(one.end for one in results)
     passed = [one for one in results if one.end == "passed"]
     continued = len(results) - ends["handled"] - ends["missing"]

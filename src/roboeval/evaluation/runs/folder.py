@@ -44,7 +44,7 @@ class RunFolder:
 
     @property
     def turns(self) -> Path:
-        """Return the path of turns.jsonl, the log of a model's replies as an agent."""
+        """Return the path of turns.jsonl, the log of an agent's replies."""
         return self.path / "turns.jsonl"
 
     def rows(self, key: str) -> Path:
@@ -82,9 +82,9 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         except FileExistsError:
-            raise UserError("is a file, but a run is a folder; name a folder", file=self.path) from None
+            raise UserError("this is a file, not a run folder; choose another path", file=self.path) from None
         except OSError as error:
-            raise UserError(f"cannot be written ({error.strerror})", file=self.path) from None
+            raise UserError(f"the run cannot be written ({error.strerror})", file=self.path) from None
         if not _locked(descriptor):
             os.close(descriptor)
             raise UserError("another process is writing to this run; wait until it is done", file=self.path)
