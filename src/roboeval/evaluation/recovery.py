@@ -110,14 +110,14 @@ def find_first_right(
 
 
 def check_rest(worker: Worker, suite: Suite, program: str, room_map: RoomMap, begun: str) -> CheckResult:
-    """Check a program for the rest of a mission. It must not repeat steps of the first program, `begun`."""
+    """Check a program that completes a mission. It must not repeat steps of the first program, `begun`."""
     settings = CheckSettings(skills=suite.skills, house_rules=suite.house_rules)
     left = remaining_outcomes(begun, room_map, suite.skills, worker=worker)
     return with_repetition_problems(check_on(worker, program, room_map, settings), begun, left)
 
 
 def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: str | None) -> FaultResult:
-    """Check and run a program for the rest of a mission, or None if missing, and judge the whole mission."""
+    """Check and run a program (None if missing) that completes a mission. Judge the whole mission."""
     if program is None:
         return replace(one.result, end="missing")
     problems = check_rest(worker, suite, program, one.room_map, one.past.program).problems

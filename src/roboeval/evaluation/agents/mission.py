@@ -116,7 +116,7 @@ class AgentMission:
             self._note(f"In the end: {text}")
 
     def end(self, ending: str, why: str = "") -> None:
-        """End the mission with one of `ENDINGS`, such as `TurnLimit`. Add the comment `why` to the program."""
+        """End the mission with one of `ENDINGS`, such as `TurnLimit`. Add the comment `why` to `program`."""
         self.ending = ending
         if why:
             self._note(f"{ending}: {why}")

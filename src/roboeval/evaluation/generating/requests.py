@@ -146,10 +146,10 @@ def _run_metadata(
     if run.about.exists():
         earlier = load_json_object(run.about)
         if not isinstance(earlier.get("settings"), dict):
-            raise UserError("has imported completions; name another folder for new ones", file=run.path)
+            raise UserError("the run has imported completions; name another folder", file=run.path)
         _expect_same(earlier, fixed, run.about)
     elif run.completions.exists() and run.completions.stat().st_size:
-        why = "is missing, so the settings of the completions are unknown"
+        why = "this file is missing, so the settings of the completions are unknown"
         raise UserError(f"{why}; name another folder", file=run.about)
     paid_twice = earlier.get("possibly_paid_twice", 0)
     return {**fixed, "batches": batches(earlier), "possibly_paid_twice": paid_twice}

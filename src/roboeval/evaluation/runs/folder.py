@@ -125,7 +125,7 @@ class RunFolder:
         others = sorted(one.name for one in self.path.iterdir() if not one.name.startswith("."))
         if others:
             raise UserError(
-                f'is not a run, but contains other files such as "{others[0]}"; name a new folder',
+                f'this is not a run, but contains other files such as "{others[0]}"; name a new folder',
                 file=self.path,
             )
 
@@ -173,7 +173,7 @@ def load_json_object(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError):
         data = None
     if not isinstance(data, dict):
-        raise UserError("is not a JSON object; repair or remove the file", file=path)
+        raise UserError("this is not a JSON object; repair or remove the file", file=path)
     return data
 
 
@@ -232,9 +232,9 @@ def evaluation_of(
     suite = with_judged_worlds(run, suite, ablated=ablated)
     key = evaluation_key(suite, ablated=ablated)
     if not run.completions.is_file():
-        raise UserError("is not a run, because it contains no completions.jsonl; choose a run", file=path)
+        raise UserError("this is not a run: it contains no completions.jsonl; choose a run", file=path)
     if not run.rows(key).is_file():
         others = ", ".join(name for name in run.judged_by() if name != suite.name)
         only = f' as "{key}", only as {others}; choose with --suite and --rules, or' if others else ";"
-        raise UserError(f"has not been judged{only} run `{again}`", file=path)
+        raise UserError(f"the run has not been judged{only} run `{again}`", file=path)
     return run, key, suite
