@@ -19,7 +19,7 @@ def engine_named(
 ) -> Iterator[Callable[[int], OpenEngine]]:
     """Yield a function that takes the number of programs to run and returns the engine for them.
 
-    `workers` programs run in parallel, by default as many as suit the cores. `isolation`: see `WorkerPool`.
+    By default, `workers` depends on the number of cores. `isolation` holds options of `WorkerPool`.
     """
     if name == "local":
         from codebotler.simulator.pool import WorkerPool, cores

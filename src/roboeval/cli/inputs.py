@@ -125,7 +125,7 @@ def open_run(
 def open_with_results(
     run: Path, suite_name: str, *, ablated: bool, rules: Path | None = None, reuse_from: Results | None = None
 ) -> Results:
-    """Read a run with `open_run`. Print a note if it is only partly judged. Raise UserError if nothing is."""
+    """Read a run with `open_run`. Print a note if it is partly judged, or raise UserError if not at all."""
     results = open_run(run, suite_name, ablated=ablated, rules=rules, reuse_from=reuse_from)
     unjudged = unjudged_sentence(results, suite_name, rules)
     if results.table.is_empty():

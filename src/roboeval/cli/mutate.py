@@ -77,7 +77,7 @@ def mutate(
 
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
-    """Return the programs of runs or other sources by task, with names such as `my-run:LunchTime/0/12`."""
+    """Read programs from runs or other sources. Return them by task, named like `my-run:LunchTime/0/12`."""
     from roboeval.evaluation.runs.completions import name_of
     from roboeval.evaluation.runs.source import open_source
     from roboeval.mutation.mutants import Original

@@ -112,14 +112,14 @@ def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[st
     if not path.exists():
         if rows.exists() and rows.stat().st_size:
             raise UserError(
-                "is missing, so it is unknown how the rows were judged; use --redo to judge again", file=path
+                "this file, which describes the evaluation, is missing; use --redo to judge again", file=path
             )
         return None
     was = load_json_object(path)
     for name, now in evaluation_metadata(suite, ablated=ablated, tasks=None).items():
         if was.get(name) != now and name != "tasks":
             change = f'"{name}" was {_brief(was.get(name))} and is now {_brief(now)}'
-            raise UserError(f"was judged differently: {change}; use --redo to judge again", file=path)
+            raise UserError(f"the run was judged differently: {change}; use --redo to judge again", file=path)
     return was
 
 

@@ -68,7 +68,7 @@ def roboeval(
     if mode not in {"program", "agent"}:
         raise UserError(f'the mode is {mode!r}; use "program" or "agent"')
     if max_turns is not None and not (is_agent and max_turns in range(1, 1_001)):
-        raise UserError(f"max_turns is {max_turns!r}; use a whole number from 1 to 1,000, with mode=agent")
+        raise UserError(f"max_turns is {max_turns!r}; use 1 to 1,000 with mode=agent, or leave max_turns out")
     our, drawn = SamplingSettings(), _suite(suite, worlds, seed)
     abouts: list[dict[str, Any]] = [
         {"task": name, "prompt": number, **world}

@@ -101,7 +101,7 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
 def find_first_right(
     worker: Worker, suite: Suite, completions: Iterable[Completion]
 ) -> Iterator[list[Interruption | FaultResult]]:
-    """Yield `find_interruptions` of each completion, but [] once a right program of its task is found."""
+    """Yield `find_interruptions` for each completion, or [] if an earlier one of its task was right."""
     done: set[str] = set()
     for one in completions:
         found = [] if one.task in done else find_interruptions(worker, suite, one)
@@ -110,14 +110,14 @@ def find_first_right(
 
 
 def check_rest(worker: Worker, suite: Suite, program: str, room_map: RoomMap, begun: str) -> CheckResult:
-    """Check a program for the rest of a mission. It must not repeat steps of the first program, `begun`."""
+    """Check a program that completes a mission. It must not repeat steps of the first program, `begun`."""
     settings = CheckSettings(skills=suite.skills, house_rules=suite.house_rules)
     left = remaining_outcomes(begun, room_map, suite.skills, worker=worker)
     return with_repetition_problems(check_on(worker, program, room_map, settings), begun, left)
 
 
 def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: str | None) -> FaultResult:
-    """Check and run a program for the rest of a mission, or None if missing, and judge the whole mission."""
+    """Check and run a program (None if missing) that completes a mission. Judge the whole mission."""
     if program is None:
         return replace(one.result, end="missing")
     problems = check_rest(worker, suite, program, one.room_map, one.past.program).problems
@@ -171,7 +171,7 @@ def write_continuations(
 
 
 def recovery_data(results: Sequence[FaultResult]) -> dict[str, int | float | None]:
-    """Return counts of missions and steps, and shares of continued missions, or None if there are none."""
+    """Count missions and steps. Also return shares of the continued missions, each None if there are none."""
     ends = Counter(one.end for one in results)
     passed = [one for one in results if one.end == "passed"]
     continued = len(results) - ends["handled"] - ends["missing"]

@@ -124,7 +124,7 @@ def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
-    """Parse labels such as `my-run=Mine`, and return them by the index in `paths` of the run they name."""
+    """Parse labels such as `my-run=Mine`. The result maps the index of a run in `paths` to its label."""
     labels: dict[int, str] = {}
     names = [{str(path), path.resolve().name} for path in paths]
     for text in texts:

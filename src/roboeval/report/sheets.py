@@ -59,7 +59,7 @@ class Sheet(NamedTuple):
 def sheet(
     name: str, rows: Sequence[Sequence[Any]], *, notes: Sequence[str] = (), shares: Sequence[str] = ()
 ) -> Sheet:
-    """Create a table with the columns listed in page.yaml, plus a column of shares for each of `shares`."""
+    """Create the table `name` with its columns in page.yaml, plus a column of shares for each of `shares`."""
     kinds = page_text("tables", name)["columns"]
     columns = [Column(head, kind) for part in kinds for kind, heads in part.items() for head in heads]
     return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)

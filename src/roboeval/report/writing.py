@@ -53,7 +53,7 @@ def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
 
 
 def sections(runs: Sequence[JudgedRun], *, with_published: bool = False, command: str = "") -> list[Section]:
-    """Return a report's non-empty sections, optionally with published causes. The last shows `command`."""
+    """Return non-empty report sections. `with_published` adds the paper's causes. The last has `command`."""
     found = [
         glance_section(runs),
         scores.results_section(runs),
@@ -110,7 +110,7 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
-    """Return sentences on the suite and its settings. The last one introduces the report's command."""
+    """Return sentences on the suite and its settings, and one that introduces the report's command."""
     head = runs[0].results.manifest
     version, digest = head.get("version"), head.get("digest")
     return (

@@ -47,7 +47,7 @@ class CheckFile(StrictForm):
     """A check in a task file: a formula that requirements name, such as `asks_in(room)`.
 
     Args:
-        means: what the regexes mean, for explanations, by kind of event. A plain string applies to `say`.
+        means: by kind of event, what its regex means, as shown in explanations. A plain string is for `say`.
     """
 
     category: Category  # the kind of failure if the check fails
@@ -63,7 +63,7 @@ class TaskFact(StrictForm):
     """A fact in an instruction, such as "she is in her office", on which requirements depend.
 
     Args:
-        words: regexes. Each prompt must match one of them, or none of them if the fact is common sense.
+        words: regexes. Each prompt must match at least one; if the fact is common sense, it must match none.
     """
 
     fact: YamlText  # a sentence that states the fact
@@ -134,7 +134,7 @@ class SampledThingFile(StrictForm):
 
 
 class CornerFile(StrictForm):
-    """A world of a sampled task with some values set by hand. The rest use the first of their lists."""
+    """A world of a sampled task with some values set by hand. Other values are the first in their lists."""
 
     about: Name
     set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}

@@ -32,7 +32,7 @@ class SolutionsFile(StrictForm):
 
 
 def solutions(task: Task) -> tuple[Solution, ...]:
-    """Return the different solutions of a task, including those of the suite whose instruction it borrows."""
+    """Return the distinct solutions of a task, with those in the suite `paper` if it lent the prompts."""
     folders = [task.path.parents[1], *([LENDING_SUITE] if task.borrows else [])]
     distinct: dict[str, Solution] = {}
     for form in (_read(folder, task) for folder in folders):
@@ -43,7 +43,7 @@ def solutions(task: Task) -> tuple[Solution, ...]:
 
 
 def locate_solution(task: Task, solution: Solution) -> tuple[Path, int | None]:
-    """Return the file and line of a solution under `programs`, or else line 1 of the task file."""
+    """Return a solution's file and line, or line 1 of the task file if it is not listed in `programs`."""
     path = task.path.parents[1] / "solutions" / task.path.name
     programs = _read(task.path.parents[1], task).programs
     if solution not in programs:
@@ -52,7 +52,7 @@ def locate_solution(task: Task, solution: Solution) -> tuple[Path, int | None]:
 
 
 def equivalent_mutants(task: Task) -> Mapping[tuple[str, str], str]:
-    """Map a task's known equivalent mutants, as (operator, `bare_diff`), to the reason why each is right."""
+    """Return why some mutants (changed programs) of a task are still right, by (operator, `bare_diff`)."""
     listed = _read(task.path.parents[1], task).equivalent_mutants
     return {(one.operator, bare_diff(one.diff)): one.because.strip() for one in listed}
 

@@ -60,7 +60,7 @@ class TaskCheck:
     """A named formula in a task, such as `asks_in(room)`. Requirements call it with arguments.
 
     Args:
-        means: what its regexes mean, for explanations, by kind of event; may contain `{parameter}`.
+        means: by kind of event, what its regex means, as shown in explanations; may contain `{parameter}`.
     """
 
     name: str  # the name that requirements use

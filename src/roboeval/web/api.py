@@ -59,7 +59,7 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
     def show_table(run: str, table: str) -> Response:
         """Return a table of a run's report as CSV."""
         if not TABLE_NAME.fullmatch(table):
-            raise HTTPException(404, "a report has no table with this name")
+            raise HTTPException(404, "this is not a table of a report; see the names in report/tables")
         return Response(store.report(run, f"tables/{table}.csv"), media_type="text/csv")
 
     @api.get("/{run}/completions")

@@ -43,7 +43,7 @@ class RunStore:
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """Return a run's latest snapshot. `key` names an evaluation; by default, ablations are avoided."""
+        """Return a run's latest snapshot. `key` is its evaluation (default: one without ablation, if any)."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:

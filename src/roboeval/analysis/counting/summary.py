@@ -96,7 +96,7 @@ PASSED, ALL = "passed", "all"
 
 @dataclass(frozen=True)
 class Causes:
-    """Shares of completions by outcome (passed or a failure class), and of each class's failures by kind."""
+    """The shares of completions by outcome (passed or a failure class), and of kinds within each class."""
 
     classes: Mapping[str, float]  # shares of all completions, including PASSED
     kinds: Mapping[str, Mapping[str, float]]  # shares of the failures in a class

@@ -94,7 +94,7 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
 
 
 def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:
-    """Print which verdicts change from the first to the second suite (`paper,plus`), in `most` groups."""
+    """Print how verdicts change between two suites, such as `paper,plus`. List at most `most` groups."""
     from roboeval.analysis.comparisons.verdict_changes import changes_data, verdict_changes
     from roboeval.cli.views.comparison import changes_view
     from roboeval.evaluation.runs.completions import how_many

@@ -90,7 +90,7 @@ def parse_formula(text: str) -> Formula:
 def found_data(
     one: TraceMatch, worlds: Sequence[tuple[int, str]], passed: Container[CompletionKey]
 ) -> dict[str, Any]:
-    """Return a found completion as JSON data: its name, whether it is in `passed`, and the given worlds."""
+    """Convert a search result to JSON data: the completion, whether it passed, and `worlds`."""
     from roboeval.evaluation.runs.completions import name_of
 
     return {

@@ -32,9 +32,9 @@ def found_view(
     groups: int,
     is_search: bool,
 ) -> RenderableType:
-    """Return a view of the failure groups `shown`, out of `groups` in all.
+    """Return a view of the completions `found` among `total`, and of the groups `shown` among `groups`.
 
-    If `is_search`, it starts with the numbers found by task. `found` are the completions found among `total`.
+    If `is_search`, the view starts with the number of found completions of each task.
     """
     failed = sum(one.key not in passed for one in found)
     parts: list[RenderableType] = []

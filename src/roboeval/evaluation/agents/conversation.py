@@ -49,7 +49,7 @@ class Conversation(ABC):
             self.end(reply.no_program)
 
     def end(self, ending: str, why: str = "") -> None:
-        """End the mission with one of `ENDINGS`, such as `Rejected`. `why` is added as a comment."""
+        """End the mission with one of `ENDINGS`, such as `Rejected`. Add the comment `why` to the program."""
         self.prompt = None
         self.mission.end(ending, why)
 

@@ -93,7 +93,7 @@ class AgentMission:
         return text
 
     def refuse(self, kind: str, sentence: str, what: str) -> str:
-        """Count a mistake, add a comment, and return a message. End the mission after three in a row."""
+        """Count a mistake, add the comment `what`, and return a message. Three in a row end the mission."""
         self.mistakes[kind] += 1
         self._in_a_row += 1
         self._note(f"{kind}: {what}")
@@ -116,7 +116,7 @@ class AgentMission:
             self._note(f"In the end: {text}")
 
     def end(self, ending: str, why: str = "") -> None:
-        """End the mission with one of `ENDINGS`, such as `TurnLimit`. `why` is added as a comment."""
+        """End the mission with one of `ENDINGS`, such as `TurnLimit`. Add the comment `why` to `program`."""
         self.ending = ending
         if why:
             self._note(f"{ending}: {why}")

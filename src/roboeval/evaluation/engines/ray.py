@@ -136,7 +136,7 @@ def run_shard(
     versions: str,  # a machine with other versions might judge differently
     isolation: Mapping[str, bool],
 ) -> tuple[list[WorkResult], str | None]:
-    """Run programs in a Ray process. Return the results, and a warning if isolation is incomplete."""
+    """Run programs in a Ray process. Return results and any warning. Raise EngineError if versions differ."""
     machine = platform.node()
     if versions != VERSIONS:
         raise EngineError(f"{machine} has {VERSIONS}; install {versions} there")

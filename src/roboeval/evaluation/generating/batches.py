@@ -52,7 +52,7 @@ def write_requests(
     with run.writing():
         about, _, todo = begin_batch(run, plan, model.name, model.settings)
         if not todo:
-            raise UserError(f"already has all {how_many(len(plan.keys()))}; request more", file=run.path)
+            raise UserError(f"all {how_many(len(plan.keys()))} already exist; request more", file=run.path)
         with open_replacement(path) as file:
             for number, key in enumerate(todo, 1):
                 asked = model.request(plan.prompt(key), number=plan.sample(key))
@@ -138,7 +138,7 @@ def _row(
 def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:
     about = about_of(run)
     if not batches(about):
-        raise UserError("was not started by `roboeval generate --requests`; name another run", file=run.path)
+        raise UserError("this run was not started by `generate --requests`; name another", file=run.path)
     if about.get("suite") != suite.name:
         sentence = f'belongs to the suite "{about.get("suite")}"; select that suite with --suite'
         raise UserError(sentence, file=run.path)

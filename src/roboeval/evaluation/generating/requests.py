@@ -57,7 +57,7 @@ class GenerationPlan:
         return prompt_for(self.instruction(key), rules=rules, skills=skills)
 
     def sample(self, key: CompletionKey) -> int:
-        """Return the index of a completion among those of its prompt. It varies the model's seed."""
+        """Return a completion's index within its prompt, to vary the model's random seed."""
         return key[2]
 
     def copied_completions(self) -> Iterable[Completion]:
@@ -111,7 +111,7 @@ class RoundPlan(GenerationPlan):
         return first.after(program, self.problems[key]) if self.repairs and program.strip() else first
 
     def sample(self, key: CompletionKey) -> int:
-        """Return a number that differs between samples and rounds of a prompt. It varies the model's seed."""
+        """Return a number that differs between a prompt's completions and rounds, to vary the random seed."""
         return key[2] + self.number * SAMPLE_STRIDE
 
     def copied_completions(self) -> Iterator[Completion]:
@@ -146,10 +146,10 @@ def _run_metadata(
     if run.about.exists():
         earlier = load_json_object(run.about)
         if not isinstance(earlier.get("settings"), dict):
-            raise UserError("has imported completions; name another folder for new ones", file=run.path)
+            raise UserError("the run has imported completions; name another folder", file=run.path)
         _expect_same(earlier, fixed, run.about)
     elif run.completions.exists() and run.completions.stat().st_size:
-        why = "is missing, so the settings of the completions are unknown"
+        why = "this file is missing, so the settings of the completions are unknown"
         raise UserError(f"{why}; name another folder", file=run.about)
     paid_twice = earlier.get("possibly_paid_twice", 0)
     return {**fixed, "batches": batches(earlier), "possibly_paid_twice": paid_twice}
@@ -180,13 +180,13 @@ def _with_batch(
 
 
 def batches(metadata: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the batches of requests that `metadata`, the content of run.json, records, in order."""
+    """Return the batches of requests recorded in `metadata`, the content of run.json, in order."""
     found = metadata.get("batches")
     return [dict(one) for one in found if isinstance(one, dict)] if isinstance(found, list) else []
 
 
 def requested_tasks(metadata: Mapping[str, Any]) -> frozenset[str] | None:
-    """Return the tasks that were requested according to `metadata`, the content of run.json; None for all."""
+    """Return the tasks requested so far according to `metadata`, the content of run.json, or None for all."""
     requested: set[str] = set()
     for batch in batches(metadata):
         if not isinstance(batch.get("tasks"), list):
@@ -221,7 +221,7 @@ def timestamp() -> str:
 
 
 class RequestLog:
-    """Logs requests, to count those left pending by an interruption. They may be billed twice.
+    """Logs requests, to count those pending when a command is interrupted, which may be billed twice.
 
     Each request is logged before it is sent, and again if it ends without a completion. Any other request
     without a completion was pending. Each command starts a new file, and deletes it on normal exit.

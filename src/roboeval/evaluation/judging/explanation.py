@@ -69,7 +69,7 @@ def suite_instruction(suite: Suite | None, task: str, prompt: int) -> str | None
 
 
 def instruction_shown(recorded: str | None, of_suite: str | None) -> tuple[str | None, str | None]:
-    """Return a note (None if an instruction is recorded), and the instruction to show (None if unknown)."""
+    """Return a note (None if `recorded` is given), and the instruction: `recorded`, or else `of_suite`."""
     if recorded is not None or of_suite is None:
         return INSTRUCTION_NOT_RECORDED if recorded is None else None, recorded
     return f"{INSTRUCTION_NOT_RECORDED}; {OF_SUITE}", of_suite
@@ -139,7 +139,7 @@ def error_sentence(verdict: Mapping[str, Any]) -> str:
 
 
 def first_lines(program: str) -> tuple[str, int]:
-    """Return the first 1,000 lines of a program, shortened if long, and the number of lines left out."""
+    """Return a program's first 1,000 lines, with long ones shortened, and the number of lines left out."""
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MAX_PROGRAM_LINES])
     return shown, max(0, len(lines) - MAX_PROGRAM_LINES)

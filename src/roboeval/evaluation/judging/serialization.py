@@ -29,9 +29,9 @@ FAILED_PREFIX = b'{"passed": false, '  # how `judgement` starts a failed judgeme
 
 
 def add_reply_fault(completion: Completion, judgement_json: bytes) -> bytes:
-    """Return a judgement in which the failure is that a reply has no program, or an agent called no skill.
+    """Set the failure of a failed judgement if the reply contained no program or the agent called no skill.
 
-    Without this, the failure would be the error or failed check from running the reply. Other judgements are
+    This replaces the error or failed check that came from running the reply. Other judgements are
     returned unchanged.
     """
     if not judgement_json.startswith(FAILED_PREFIX):
@@ -99,7 +99,7 @@ def verdict_data(verdict: Verdict) -> dict[str, Any]:
 
 
 def limit_size(judgement: Mapping[str, Any]) -> bytes:
-    """Return a judgement as JSON. If it is too long for a row, cut traces so that worlds share it equally."""
+    """Return a judgement as JSON. If it is too long for a row, cut long traces to equal shares of it."""
     whole = _json(judgement)
     verdicts = judgement["verdicts"]
     most = max(ROW_BYTES, WORLD_BYTES * len(verdicts)) - ROW_HEADER_BYTES

@@ -177,7 +177,7 @@ def read_completions(
         except UserError as error:
             raise UserError(error.sentence, file=path, line=number) from None
     if not seen:
-        raise UserError(f"contains no completion; a row looks like {EXAMPLE}", file=path)
+        raise UserError(f"the file contains no completion; a row looks like {EXAMPLE}", file=path)
 
 
 def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completion | None:

@@ -37,10 +37,10 @@ _NORMAL = {FINAL_ANSWER, ERROR, NO_CALL}
 
 
 def apply_ending(outcome: Outcome, ending: str) -> Outcome:
-    """Return the outcome of an agent's mission, given the outcome of a program with the same calls.
+    """Return the outcome of an agent's mission. `outcome` is that of a program with the same calls.
 
-    Only the outcome of a finished program may change: to a timeout if the ending is a limit, or to an error
-    of the agent if the ending is a mistake, such as giving up.
+    If the program finished, an ending such as `TurnLimit` changes the status to a timeout, and one such as
+    `GaveUp` to an agent error. Otherwise, `outcome` is returned unchanged.
     """
     if ending in _NORMAL or outcome.status is not Status.FINISHED:
         return outcome

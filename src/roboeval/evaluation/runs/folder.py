@@ -44,7 +44,7 @@ class RunFolder:
 
     @property
     def turns(self) -> Path:
-        """Return the path of turns.jsonl, the log of a model's replies as an agent."""
+        """Return the path of turns.jsonl, the log of an agent's replies."""
         return self.path / "turns.jsonl"
 
     def rows(self, key: str) -> Path:
@@ -82,9 +82,9 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         except FileExistsError:
-            raise UserError("is a file, but a run is a folder; name a folder", file=self.path) from None
+            raise UserError("this is a file, not a run folder; choose another path", file=self.path) from None
         except OSError as error:
-            raise UserError(f"cannot be written ({error.strerror})", file=self.path) from None
+            raise UserError(f"the run cannot be written ({error.strerror})", file=self.path) from None
         if not _locked(descriptor):
             os.close(descriptor)
             raise UserError("another process is writing to this run; wait until it is done", file=self.path)
@@ -125,7 +125,7 @@ class RunFolder:
         others = sorted(one.name for one in self.path.iterdir() if not one.name.startswith("."))
         if others:
             raise UserError(
-                f'is not a run, but contains other files such as "{others[0]}"; name a new folder',
+                f'this is not a run, but contains other files such as "{others[0]}"; name a new folder',
                 file=self.path,
             )
 
@@ -173,7 +173,7 @@ def load_json_object(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError):
         data = None
     if not isinstance(data, dict):
-        raise UserError("is not a JSON object; repair or remove the file", file=path)
+        raise UserError("this is not a JSON object; repair or remove the file", file=path)
     return data
 
 
@@ -232,9 +232,9 @@ def evaluation_of(
     suite = with_judged_worlds(run, suite, ablated=ablated)
     key = evaluation_key(suite, ablated=ablated)
     if not run.completions.is_file():
-        raise UserError("is not a run, because it contains no completions.jsonl; choose a run", file=path)
+        raise UserError("this is not a run: it contains no completions.jsonl; choose a run", file=path)
     if not run.rows(key).is_file():
         others = ", ".join(name for name in run.judged_by() if name != suite.name)
         only = f' as "{key}", only as {others}; choose with --suite and --rules, or' if others else ";"
-        raise UserError(f"has not been judged{only} run `{again}`", file=path)
+        raise UserError(f"the run has not been judged{only} run `{again}`", file=path)
     return run, key, suite

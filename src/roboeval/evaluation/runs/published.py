@@ -69,7 +69,7 @@ def _by_key(files: Iterator[File], path: Path) -> dict[CompletionKey, File]:
             )
         by_key[key] = file
     if not by_key:
-        raise UserError(f"contains no file named {NAMED}; choose a folder or zip that does", file=path)
+        raise UserError(f"there is no file named {NAMED}; choose another folder or zip", file=path)
     return by_key
 
 
@@ -82,7 +82,7 @@ def _files(path: Path) -> Iterator[Iterator[File]]:
     try:
         archive = zipfile.ZipFile(path)
     except UNREADABLE_ZIP as error:
-        raise UserError(f"is not a readable zip ({error}); create it again", file=path) from None
+        raise UserError(f"this is not a readable zip ({error}); create it again", file=path) from None
     with archive:
         yield _members(path, archive)
 
@@ -95,15 +95,15 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
         nonlocal unpacked
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             # Other compression methods may unpack chunks of any size.
-            raise UserError('is compressed in an unusual way; create the zip with "deflate"', file=name)
+            raise UserError('this is compressed in an unusual way; create the zip with "deflate"', file=name)
         try:
             with archive.open(member) as file:
                 data = file.read(MAX_ROW + 1)
         except UNREADABLE_ZIP as error:
-            raise UserError(f"is not a readable zip ({error}); create it again", file=path) from None
+            raise UserError(f"this is not a readable zip ({error}); create it again", file=path) from None
         unpacked += len(data)
         if unpacked > MAX_UNPACKED:
-            raise UserError(f"unpacks to more than {MAX_UNPACKED:,} bytes; split the zip", file=path)
+            raise UserError(f"the zip unpacks to more than {MAX_UNPACKED:,} bytes; split the zip", file=path)
         return decode_text(data, name, limit=MAX_ROW)
 
     for member in archive.infolist():
@@ -117,10 +117,10 @@ def _assigned(text: str, name: str) -> dict[str, str]:
         statements = parse(text).body
     except SyntaxError as error:
         raise UserError(
-            f"has a syntax error ({error.msg}); correct it", file=name, line=error.lineno
+            f"this file has a syntax error ({error.msg}); correct it", file=name, line=error.lineno
         ) from None
     except (ValueError, RecursionError, MemoryError):
-        raise UserError("cannot be parsed as Python; write plain assignments", file=name) from None
+        raise UserError("this file cannot be parsed as Python; write plain assignments", file=name) from None
     texts = {
         target.id: _text(statement.value, target.id, name)
         for statement in statements
@@ -129,7 +129,7 @@ def _assigned(text: str, name: str) -> dict[str, str]:
         if isinstance(target, ast.Name) and target.id in ("prompt", "completion")
     }
     if "completion" not in texts:
-        raise UserError('does not assign a string to `completion`; add `completion = "..."`', file=name)
+        raise UserError('the file assigns no string to `completion`; add `completion = "..."`', file=name)
     return texts
 
 

@@ -175,7 +175,7 @@ def read_lines_of(
 
 
 def take_judged(left: dict[CompletionKey, Completion], line: LocatedRow, file: Path) -> Completion:
-    """Remove the completion that a row judges from `left`, and return the completion.
+    """Remove the completion that a row judges from `left` (those without a row), and return it.
 
     Raises UserError if `left` does not contain the completion, or if its program has changed since.
     """

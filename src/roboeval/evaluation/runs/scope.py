@@ -60,7 +60,7 @@ class JudgingScope:
         about: Mapping[str, Any] = {},
         suite: Suite | None = None,
     ) -> JudgingScope:
-        """Count completions by task. Consider only `tasks` for models, missions and cut-offs (None: all)."""
+        """Count completions by task, and missions and cut-off replies of the selected `tasks` (None: all)."""
         every = list(completions)
         selected = [one for one in every if tasks is None or one.task in tasks]
         missions = [(one.mission.ending, one.turns) for one in selected if one.mission is not None]

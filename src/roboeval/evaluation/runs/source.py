@@ -41,7 +41,7 @@ def open_source(text: str, suite: Suite) -> Source:
     if path.is_dir() or path.suffix == ".zip":
         return Source([*published_completions(path, suite)])
     if path.suffix == ".py":
-        raise UserError(f"is a single program; write it as a row of a .jsonl file: {EXAMPLE}", file=path)
+        raise UserError(f"this is a single program; write it as a row of a .jsonl file: {EXAMPLE}", file=path)
     return Source([*read_completions(path, suite)])
 
 

@@ -96,7 +96,7 @@ def keys_where(table: pl.DataFrame, condition: pl.Expr) -> list[CompletionKey]:
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
-    """Fill in the column `accepted`: whether `problems[task, hash]` is empty, or null if it is missing."""
+    """Fill in `accepted`: true if a program has no `problems`, by (task, hash), or null if not checked."""
     names = ["task", "program_sha256"]
     answers = [(*key, not found) for key, found in problems.items()]
     accepted = pl.DataFrame(

@@ -17,7 +17,7 @@ from roboeval.evaluation.runs.rows import key_of
 
 
 class TurnLog:
-    """Saves each of a model's replies as an agent at once, so that an interrupted mission can resume."""
+    """Saves an agent's replies as they arrive, so that an interrupted mission can resume."""
 
     def __init__(self, path: Path, done: Collection[CompletionKey]) -> None:
         self._replies: dict[CompletionKey, list[Reply]] = {}

@@ -35,7 +35,7 @@ def causes_section(runs: Sequence[JudgedRun], *, with_published: bool) -> Sectio
 
 
 def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple[str, Causes]]:
-    """Pair each run's name with its causes of failures. `with_published` adds those in the paper, if any."""
+    """Return (name, causes of failures) of each run and, if `with_published`, of its model in the paper."""
     found: list[tuple[str, Causes]] = []
     for run in runs:
         found.append((run.name, causes(tally_of(run.table))))

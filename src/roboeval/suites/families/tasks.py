@@ -97,7 +97,7 @@ class GeneratedTask:
 
 @cache
 def family_names() -> tuple[str, ...]:
-    """Return the sorted names of all families that ship with RoboEval."""
+    """Return the sorted names of the task families (templates) that ship with RoboEval."""
     return tuple(sorted(path.stem for path in (FAMILY_FOLDER / "templates").glob("*.yaml")))
 
 
