@@ -96,7 +96,7 @@ def forking(python: str) -> Iterator[None]:
     import pytest  # noqa: PLC0415 - the interpreter with ROS may lack it
 
     from codebotler.core.skills.paper import SKILLS  # noqa: PLC0415 - it lacks this, too
-    from codebotler.robots.ros.worker import WORKERS_FOLDER  # noqa: PLC0415
+    from codebotler.robots.ros.worker import WORKERS_FOLDER  # noqa: PLC0415 - and this
 
     actions = [{"type": s.ros.type, "definition": s.ros.definition} for s in SKILLS.rows if s.ros is not None]
     SERVERS[python] = Server(command=(python, __file__, str(WORKERS_FOLDER), json.dumps(actions)))
