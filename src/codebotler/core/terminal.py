@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rich.console import Console, RenderableType
     from rich.progress import Progress, ProgressColumn
 
+LEAST_CUT = 30  # shorter ends of texts are shown, since the note about them would be as long
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 MAX_PIPE_WIDTH = 10_000
 
@@ -197,6 +198,6 @@ def visible_lines(text: str) -> str:
 
 
 def shortened(text: str, most: int = 500, shown: Callable[[str], str] = visible) -> str:
-    """Escape a string with `shown`, and shorten it after `most` characters: `abc... 9 more characters`."""
+    """Escape a string with `shown`, and shorten it after `most` characters: `abc... 99 more characters`."""
     left = len(text) - most
-    return shown(text) if left <= 0 else f"{shown(text[:most])}... {left:,} more characters"
+    return shown(text) if left <= LEAST_CUT else f"{shown(text[:most])}... {left:,} more characters"

@@ -13,7 +13,7 @@ from codebotler.checking.problems import CheckResult, Sample
 from codebotler.checking.storyboard import event_from_step, select_steps, steps_of
 from codebotler.core.skills.kinds import CHECK, GOTO
 from codebotler.core.terminal import shortened
-from codebotler.core.text.phrases import NO_ANSWER, is_question, is_spoken, phrase
+from codebotler.core.text.phrases import NO_ANSWER, bracketed, is_question, is_spoken, phrase
 from codebotler.core.trace import Event
 from codebotler.missions.display.progress import ANSWER
 from codebotler.web.frame import PlainText
@@ -206,6 +206,7 @@ def _actions(step: Mapping[str, Any]) -> Sequence[Action]:
         return (Action(kind, _phrase(event_from_step(step)), number, is_repeated),)
     if "answer" not in step:
         return (Action(kind, text, number, is_repeated),)
+    text += bracketed(event_from_step(step), shortened)
     return (Action(kind, text, number, is_repeated), Action(ANSWER, _answer_text(step["answer"])))
 
 

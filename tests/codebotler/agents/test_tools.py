@@ -256,12 +256,12 @@ def test_run_refuses_a_digest_of_another_program(gatekeeper: Gatekeeper) -> None
         first = await agent.call("propose_mission", program=HELLO)
         second = await agent.call("propose_mission", program=HELLO + "    say('bye')\n")
         assert first["digest"] != second["digest"]
-        assert "another program" in await agent.fails("run_mission", digest=first["digest"])
+        assert "another digest" in await agent.fails("run_mission", digest=first["digest"])
         gatekeeper.console.edit(HELLO + "    say('a person wrote this')\n")
         await wait_until(gatekeeper, lambda view: view.may_be_approved)
-        assert "another program" in await agent.fails("run_mission", digest=second["digest"])
+        assert "another digest" in await agent.fails("run_mission", digest=second["digest"])
         for wrong in ("", second["digest"][:-1], second["digest"].upper() + "é"):
-            assert "another program" in await agent.fails("run_mission", digest=wrong)
+            assert "another digest" in await agent.fails("run_mission", digest=wrong)
         assert not view_of(gatekeeper).progress.has_begun
 
     use(gatekeeper, act)

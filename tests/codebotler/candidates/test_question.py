@@ -87,6 +87,18 @@ def test_a_shorter_storyboard_is_preferred() -> None:
     assert ask_about(cluster(1, "a", (look, *ONE), ONE), cluster(1, "b", TWO, TWO)).sample == 1
 
 
+def test_a_world_in_which_a_search_is_seen_is_preferred() -> None:
+    found = Event("check", "mug", found=True, place="lab")
+    search = (
+        replace(found, found=False, place="hall"),
+        drive("hall", "lab"),
+        found,
+        drive("lab", "hall"),
+        *ONE,
+    )
+    assert ask_about(cluster(1, "a", (found, *ONE), search), cluster(1, "b", TWO, TWO)).sample == 1
+
+
 def test_a_world_in_which_the_most_frequent_behaviour_does_something_is_preferred() -> None:
     drives = (drive("hall", "lab"),)
     assert ask_about(cluster(2, "a", drives, (*drives, *ONE)), cluster(1, "b", TWO, TWO)).sample == 1

@@ -185,3 +185,8 @@ def test_input_typed_before_a_question_is_discarded(monkeypatch: pytest.MonkeyPa
         assert terminal.read_line("Run it? ") == "no\n"
         timer.join()
     os.close(ours)
+
+
+def test_a_text_is_not_cut_where_the_note_would_be_as_long() -> None:
+    assert terminal.shortened("x" * 530) == "x" * 530
+    assert terminal.shortened("x" * 531) == "x" * 500 + "... 31 more characters"

@@ -197,6 +197,13 @@ def test_observed_absence_makes_skills_fail() -> None:
     assert failure(nobody, "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
 
 
+def test_error_about_an_absent_person_does_not_claim_that_the_room_is_empty() -> None:
+    for absent, says_empty in (("alice", False), ("person", True)):
+        with pytest.raises(RobotError) as caught:
+            kitchen_robot(absent, there=False).perform("ask", ["alice", "Tea?", YES_NO])
+        assert ("nobody is in" in str(caught.value)) == says_empty
+
+
 def test_absent_object_says_nothing_about_people_or_other_rooms() -> None:
     robot = kitchen_robot("mug", there=False)
     robot.perform("ask", ["", "Where is the mug?", YES_NO])

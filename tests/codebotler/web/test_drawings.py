@@ -12,7 +12,7 @@ import pytest
 from codebotler.checking.check import check
 from codebotler.checking.problems import Problem
 from codebotler.checking.storyboard import MAX_SHOWN_STEPS, select_steps, steps_of
-from codebotler.core.trace import Event
+from codebotler.core.trace import Event, Option
 from codebotler.core.world import Room, World
 from codebotler.core.world_file import read_world
 from codebotler.missions.display.progress import _MAX_MOMENTS, _MAX_STEPS, Find, Moment, Progress
@@ -29,6 +29,7 @@ from codebotler.web.storyboard import (
     Action,
     Scene,
     Strip,
+    scenes,
     scenes_reached,
     strips,
 )
@@ -248,6 +249,12 @@ def test_strips_show_each_kind_of_world_once() -> None:
     }
     assert all([scene.room for scene in strip.scenes] == ["hall", "kitchen"] for strip in shown)
     assert all(strip.ends_well for strip in shown)
+
+
+def test_a_question_is_drawn_with_its_options() -> None:
+    asked = Event("ask", "Tea?", options=(Option("yes"), Option("no")), answer="no", place="hall")
+    (scene,) = scenes(steps_of((asked,)), "hall")
+    assert [deed.text for deed in scene.deeds] == ["Tea? [yes | no]", "no"]
 
 
 def test_a_long_run_is_shortened_once_even_if_many_steps_are_needed() -> None:

@@ -40,12 +40,16 @@ def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, 
     if form in {"base", "ing"}:
         result = f"answer {quote}{answer}{quote}" if answer is not None else result_words(event)
         return f"{words} ({result})" if result else words
-    if event.options:
-        shown = [f"{show(one.text)}{'' if one.is_text else ' (no text)'}" for one in event.options]
-        words += f" [{' | '.join(elide_list(shown, MAX_BRACKETED_OPTIONS))}]"
+    words += bracketed(event, show)
     if form == "past" and (answer is not None or is_question(event.kind)):
         return f"{words} → {NO_ANSWER if answer is None else answer}"
     return f"{words}: {result}" if (result := result_words(event)) else words
+
+
+def bracketed(event: Event, show: Callable[[str], str]) -> str:
+    """Return the options of a question, such as ` [yes | no]`, or an empty string if it has none."""
+    shown = [f"{show(one.text)}{'' if one.is_text else ' (no text)'}" for one in event.options]
+    return f" [{' | '.join(elide_list(shown, MAX_BRACKETED_OPTIONS))}]" if shown else ""
 
 
 def _without_quotes(show: Callable[[str], str], quote: str, text: str) -> str:

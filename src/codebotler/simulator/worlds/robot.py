@@ -129,6 +129,11 @@ class SimulatedRobot(SimulatedWorld):
             coming.looks_before -= 1
         return seen
 
+    @property
+    def may_others_be_here(self) -> bool:
+        """Whether somebody may be in this room although nobody fits a request."""
+        return self.settings.matching == "longest-name" and any(one.is_here for one in self.people_here)
+
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
         """Ask the first matching person in this room, and return the position of the option they choose."""
         person, options = as_text(person), to_options(options)
@@ -137,9 +142,8 @@ class SimulatedRobot(SimulatedWorld):
             raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
         asked = self.person_meant(person)
         if asked is None:
-            nobody, is_named = f'nobody is in "{self.room}"', self.settings.matching == "longest-name"
-            if is_named and any(one.is_here for one in self.people_here):
-                nobody = f'nobody in "{self.room}" fits "{person}"'
+            fits = f'nobody in "{self.room}" fits "{person}"'
+            nobody = fits if self.may_others_be_here else f'nobody is in "{self.room}"'
             raise RobotError("AskNoPerson", f'{nobody}, so nobody can answer "{question}"')
         answer = asked.answer(question, self.settings)
         chosen = None if answer is None else choose(answer, question, options, self.settings)

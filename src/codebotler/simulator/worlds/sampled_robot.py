@@ -360,6 +360,10 @@ class SampledRobot(SimulatedRobot):
         self.amend(texts[chosen])
         return chosen
 
+    @property
+    def may_others_be_here(self) -> bool:  # noqa: D102 - inherited
+        return SOMEBODY not in self.explored[self._around].missed
+
     def _answers(self, who: str) -> bool:
         is_there = self.is_here(who)
         around = self.explored[self._around]
