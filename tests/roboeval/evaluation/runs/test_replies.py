@@ -82,10 +82,10 @@ def test_hostile_replies_stay_text_and_are_shortened() -> None:
     more = {
         **WRITTEN.more,
         "reasoning": HOSTILE,
-        "raw_reply": "x" * (SHOWN_REPLY_CHARACTERS + 7),
+        "raw_reply": "x" * (SHOWN_REPLY_CHARACTERS + 77),
         "finish_reason": HOSTILE,
     }
     text = view(replace(WRITTEN, more=more), with_reply=True)
     assert SHOWN[:20] in text
     assert "\x1b" not in text
-    assert "... 7 more characters" in text
+    assert "... 77 more characters" in text
