@@ -28,6 +28,13 @@ FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n 
 BAD = "def task_program():\n    go_to('hall')\n    go_to('cellar')\n"
 OFFICE = (Path(__file__).parents[2] / "examples" / "office.yaml").read_text()
 NUMBERS = itertools.count(1)
+STALL = """() => {
+    const connection = window.socket.io.engine.transport.ws;
+    const [receive, held] = [connection.onmessage, []];
+    connection.onmessage = (message) => held.push(message);
+    window.release = () => { connection.onmessage = receive; held.forEach((each) => receive(each)); };
+}"""
+"""Holds back all that the server sends, until `release` is called."""
 
 
 def write(page: Page, program: str) -> None:
@@ -191,12 +198,7 @@ def test_a_click_on_a_stalled_connection_approves_only_what_it_was_made_for(
     type_and_check(page, TEA)
     button = page.get_by_role("button", name="Run it on the robot")
     expect(button).to_be_enabled()
-    page.evaluate("""() => {
-        const connection = window.socket.io.engine.transport.ws;
-        const [receive, held] = [connection.onmessage, []];
-        connection.onmessage = (message) => held.push(message);
-        window.release = () => { connection.onmessage = receive; held.forEach((each) => receive(each)); };
-    }""")
+    page.evaluate(STALL)
     server.call("POST", "/api/missions", {"program": FAR})
     wait_until(page, "fetch('api/missions/current').then(a => a.json()).then(a => a.state === 'checked')")
     page.wait_for_timeout(2_000)
@@ -206,6 +208,27 @@ def test_a_click_on_a_stalled_connection_approves_only_what_it_was_made_for(
     expect(page.get_by_text("review it again")).to_be_visible()
     expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
     expect(page.locator(".cm-content")).to_contain_text("range(50)")
+
+
+def test_a_click_as_a_stalled_connection_recovers_approves_nothing(
+    server: PageServer, open_page: OpenPage
+) -> None:
+    page = open_page(server)
+    type_and_check(page, TEA)
+    button = page.get_by_role("button", name="Run it on the robot")
+    expect(button).to_be_enabled()
+    page.evaluate(STALL)
+    server.call("POST", "/api/missions", {"program": FAR})
+    wait_until(page, "fetch('api/missions/current').then(a => a.json()).then(a => a.state === 'checked')")
+    page.wait_for_timeout(2_500)
+    button.evaluate("""async (button) => {
+        release();
+        while (!programEditor.text().includes("range(50)")) await new Promise((r) => setTimeout(r, 5));
+        button.disabled = false;
+        button.click();
+    }""")
+    expect(page.get_by_text("review it again")).to_be_visible()
+    expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
 
 
 def test_checks_keep_text_that_is_typed_meanwhile(server: PageServer, open_page: OpenPage) -> None:

@@ -96,6 +96,12 @@ def test_rule_stops_an_attempt_that_would_fail() -> None:
         one.perform("pick", ["cup"])
 
 
+@pytest.mark.parametrize("spelling", ["crown  jewel", "crown\u00a0jewel", " crown\u2028jewel"])
+def test_white_space_evades_no_rule(spelling: str) -> None:
+    violate(robot(rule('not tr.Exists(pick("crown jewel"))')), "pick", spelling)
+    violate(robot(rule('not tr.Exists(say("crown jewel"))')), "say", spelling)
+
+
 def test_rule_may_require_an_earlier_action_each_time() -> None:
     one = robot(KNOCK)
     violate(one, "go_to", "office")

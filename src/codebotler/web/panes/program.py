@@ -121,6 +121,7 @@ class ProgramPane:
             "editable": view.may_be_edited,
             "received": self._received,
             "approval": _approval(view),
+            "replaced": self._review_until,
             "force": force,
         }
         if content != self._sent or force:
@@ -194,13 +195,13 @@ class ProgramPane:
         look = "plain" if is_unfinished(view) else "go risky" if view.problems else "go"
         self._run.classes(add=look, remove="plain go risky")
 
-    async def _approve(self, seen: dict[str, object]) -> None:
+    async def _approve(self, seen: dict[str, Any]) -> None:
         """Approve the program that the browser showed at the click, which may come late, or refuse."""
         session, view = self._console.session, self._view
-        program, is_reviewed = _for_editor(view.program), time.monotonic() >= self._review_until
+        program, is_reviewed = _for_editor(view.program), seen["age"] >= 1000 * REVIEW_SECONDS
         if self._may_rerun(view):
             self._console.edit(view.program)
-        elif session and is_reviewed and seen == {"text": program, "approval": _approval(view)}:
+        elif session and is_reviewed and (seen["text"], seen["approval"]) == (program, _approval(view)):
             despite, rules = bool(self._despite.value), view.disabled_rules
             await asyncio.to_thread(
                 session.approve, view.digest, despite_problems=despite, disabled_rules=rules

@@ -10,6 +10,7 @@ def task_program():
         say("Hello")`;
   let editor; // NiceGUI's component, once it is loaded
   let latest; // the latest state from the server
+  let replacedAt = -1e9; // when this page showed a program in place of another one, in ms
   let sent = 0; // the number of texts sent
   let waiting; // the timer for sending the next text
   let base = ""; // the server's program on which local edits are based
@@ -59,10 +60,11 @@ def task_program():
   /** Send pending text at once, and return what the page shows. */
   const settle = () => {
     if (waiting !== undefined) send();
-    return { text: editor && text(), approval: latest?.approval };
+    return { text: editor && text(), approval: latest?.approval, age: performance.now() - replacedAt };
   };
 
   const show = (state) => {
+    if (latest && state.replaced !== latest.replaced) replacedAt = performance.now();
     latest = state;
     if (editor) apply();
   };
