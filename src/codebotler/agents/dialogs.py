@@ -68,9 +68,8 @@ async def find_question(ctx: AgentContext) -> OpenQuestion:
     session = gatekeeper_of(ctx).console.session
     view = None if session is None else session.view
     if session is None or view is None or view.question is None or not view.waits_for_answer:
-        raise ToolError(
-            "no mission waits for a choice between behaviours; call follow_mission to see its state"
-        )
+        sentence = "no mission waits for a choice between behaviours; call follow_mission to see its state"
+        raise ToolError(sentence)
     return OpenQuestion(session, view.question)
 
 

@@ -105,10 +105,8 @@ def approval_text(view: SessionView, robot: Robot, contract: str) -> str:
 
 def choice_text(asked: ClarifyingQuestion) -> str:
     """Return the text of the dialog to choose a behaviour, with numbered options."""
-    options = (
-        f"{number}. The robot {shortened(one.difference)} ({one.share})."
-        for number, one in enumerate(asked.options, 1)
-    )
+    numbered = enumerate(asked.options, 1)
+    options = (f"{number}. The robot {shortened(one.difference)} ({one.share})." for number, one in numbered)
     last = f'The answer "none" ends the mission: {asked.why_last}.' if asked.why_last else ""
     first = f"Which did you mean{asked.supposition}?"
     return "\n".join(filter(None, (first, *options, asked.left_out, last)))

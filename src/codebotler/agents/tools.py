@@ -93,9 +93,8 @@ async def write_program(instruction: _Instruction, ctx: AgentContext) -> CheckRe
     with as_tool_errors():
         if not gatekeeper.writes:
             raise UserError("no model is configured; write the program yourself, as read_robot explains")
-        asked = SessionView(
-            instruction=clean_instruction(instruction), room_map=console.view.room_map, rules=console.rules
-        )
+        wanted, room_map = clean_instruction(instruction), console.view.room_map
+        asked = SessionView(instruction=wanted, room_map=room_map, rules=console.rules)
         author = ModelAuthor(console.open_model, console.models[0])
         prompt = prompt_of(asked, console.robot, repair=False)
         try:
@@ -299,12 +298,8 @@ def _take_answer(
             if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
                 if view.problems != proposed.problems:
                     raise MissionError("the problems of the program have changed; call run_mission again")
-                session.approve(
-                    digest,
-                    despite_problems=bool(view.problems),
-                    disabled_rules=proposed.disabled_rules,
-                    by=person,
-                )
+                despite, disabled = bool(view.problems), proposed.disabled_rules
+                session.approve(digest, despite_problems=despite, disabled_rules=disabled, by=person)
         case AcceptedElicitation() | DeclinedElicitation() if view.digest == digest:
             session.stop_soon(person)
 

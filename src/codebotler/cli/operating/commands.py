@@ -140,11 +140,8 @@ def missions(
         note(f"wrote {len(events):,} events of mission {summary.id} to {mcap}")
         return
     folder, summary, events = read()
-    print_found(
-        lambda: mission_view(summary, events, store.find_rest(folder)),
-        lambda: {**asdict(summary), "events": events},
-        as_json=json,
-    )
+    data = {**asdict(summary), "events": events}
+    print_found(lambda: mission_view(summary, events, store.find_rest(folder)), lambda: data, as_json=json)
 
 
 def robots(

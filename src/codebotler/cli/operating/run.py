@@ -272,9 +272,8 @@ def choose_past(console: Console, name: str, program: str) -> MissionPast:
     if past.unsure is None:
         return past
     if program == "-":
-        raise UserError(
-            f"{past.unsure_step_text}; name a program file instead of `-`, so that you can answer y or n here"
-        )
+        mend = "name a program file instead of `-`, so that you can answer y or n here"
+        raise UserError(f"{past.unsure_step_text}; {mend}")
     evidence = [past.unsure_step_text]
     # On a thread, so that a signal ends the command meanwhile, and the end of the console stops the robot.
     asking = Thread(target=lambda: evidence.extend(console.ask_evidence(past, note)))
