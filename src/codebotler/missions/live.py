@@ -130,7 +130,8 @@ class LiveRobot:
         try:
             result = self._perform_logged(row, [_plain_argument(argument) for argument in arguments], event)
         except RobotError:
-            self._report_failure(row, event, room)
+            if event and row.recording and row.recording.judged_when_tried:
+                self._report(event, room, is_drive=is_drive, failed=True)
             raise
         if event is None or row.recording is None:
             return result
@@ -197,11 +198,6 @@ class LiveRobot:
             guard.judge(*(replace(event, text=text, place=room) for text in texts), is_drive=is_drive)
         return room
 
-    def _report_failure(self, row: Skill, event: Event | None, room: str) -> None:
-        """Report a failed call to the guard."""
-        if event and row.recording and row.recording.judged_when_tried:
-            self._report(event, room, is_drive=row.is_drive, failed=True)
-
     def _report(self, event: Event, room: str, *, is_drive: bool, failed: bool = False) -> None:
         """Report an executed event to the guard, because its result may break a rule."""
         guard = self._guard
@@ -221,9 +217,8 @@ class LiveRobot:
         if self._guard is None or self._stopped.is_set():
             return
         if at is None:
-            self._fault = RobotLostError(
-                "the robot stopped reporting its position during a drive, but a rule needs the position"
-            )
+            why = "the robot stopped reporting its position during a drive, but a rule needs the position"
+            self._fault = RobotLostError(why)
             self.stop()
             return
         before, self._at = self._at or at, at
@@ -344,10 +339,8 @@ class LiveRobot:
 def check_answer(skill: Skill, result: base.RobotResult) -> base.RobotResult:
     """Check a robot's result for a skill. Return it, or raise RobotLostError if its type is wrong."""
     if not skill.returns.fits(result):
-        raise RobotLostError(
-            f"the robot answered {skill.name} with {result!r:.100}, which is not of the type "
-            f"{skill.returns.annotation}; correct the robot's driver"
-        )
+        answer = f"{skill.name} with {result!r:.100}, which is not of the type {skill.returns.annotation}"
+        raise RobotLostError(f"the robot answered {answer}; correct the robot's driver")
     return result
 
 
@@ -373,6 +366,5 @@ def _chosen_option(result: base.RobotResult, event: Event) -> int:
             if same(option.text) == same(heard):
                 return number
     offered = ", ".join(option.text for option in event.options)
-    raise RobotError(
-        "AskInvalidOptions", f'the answer "{heard}" to "{event.text}" is not one of the options ({offered})'
-    )
+    why = f'the answer "{heard}" to "{event.text}" is not one of the options ({offered})'
+    raise RobotError("AskInvalidOptions", why)
