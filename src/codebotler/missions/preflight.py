@@ -93,10 +93,8 @@ def _plan(robot: Robot, world: World) -> tuple[Room, ...]:
     """Return the rooms of a map. Only robots that drive on our grid get its default footprints."""
     rooms = laid_out(world).rooms if robot.rooms_are_regexes else world.rooms
     is_straight = robot.name == "simulated"
-    return tuple(
-        replace(room, objects=(), people=(), stand_at=room.stand_at if is_straight else None)
-        for room in rooms
-    )
+    empty = (replace(room, objects=(), people=()) for room in rooms)
+    return tuple(room if is_straight else replace(room, stand_at=None) for room in empty)
 
 
 def expect_enforceable(
@@ -130,10 +128,8 @@ def limit_rooms(room_map: RoomMap | None, remark: Callable[[str], None]) -> Room
     """Return `room_map`, or report to `remark` and return None if it has too many rooms for a check."""
     if room_map is None or len(room_map.rooms) <= MAX_CHECKED_ROOMS:
         return room_map
-    remark(
-        f"the robot lists {len(room_map.rooms):,} rooms; a check supports {MAX_CHECKED_ROOMS:,}, "
-        "so it uses only the rooms that the program names"
-    )
+    limit = f"a check supports {MAX_CHECKED_ROOMS:,}, so it uses only the rooms that the program names"
+    remark(f"the robot lists {len(room_map.rooms):,} rooms; {limit}")
     return None
 
 

@@ -54,14 +54,11 @@ class PriorApproval:
         """Return what the contract still allows after `trace`: if 1 of 3 `pick` calls is done, 2 are left."""
         rows = (by_event(event.kind) for event in trace[self.done_before :] if not event.failed)
         done = Counter(row.name for row in rows if row is not None)
-        return Contract(
-            {
-                name: bound
-                if bound.at_most is None
-                else replace(bound, at_most=max(0, bound.at_most - done[name]))
-                for name, bound in self.contract.skills.items()
-            }
-        )
+        left = {**self.contract.skills}
+        for name, bound in self.contract.skills.items():
+            if bound.at_most is not None:
+                left[name] = replace(bound, at_most=max(0, bound.at_most - done[name]))
+        return Contract(left)
 
 
 def is_recoverable(view: SessionView, events: Sequence[LogLine], skills: SkillTable) -> bool:
