@@ -76,9 +76,8 @@ def prompt_of(view: SessionView, robot: Robot, *, repair: bool) -> Prompt:
     )
     if past is not None:
         place = past.place if room_map is None else room_map.start
-        prompt = prompt.to_continue(
-            past.program, past.steps, past.why, past.position_text(place), (past.done or [""])[-1]
-        )
+        position, last = past.position_text(place), (past.done or [""])[-1]
+        prompt = prompt.to_continue(past.program, past.steps, past.why, position, last)
     if repair and view.problems:
         return prompt.after(view.program, view.problems)
     if repair and view.programless is not None:

@@ -103,9 +103,8 @@ class Mission:
         self._is_over = threading.Event()
         self._fault: Exception | None = None
         self.trace: Trace = ()
-        self.summary = MissionSummary(
-            self.folder.name, MissionState.DRAFTING, robot, time.time(), instruction
-        )
+        name, now = self.folder.name, time.time()
+        self.summary = MissionSummary(name, MissionState.DRAFTING, robot, now, instruction)
         self._write("state", state=MissionState.DRAFTING)
         self.stop_button.on_press(self._log_stop)
 
@@ -159,9 +158,8 @@ class Mission:
         """
         with self._writing:
             if self.state is MissionState.CHECKED and self.summary.problems and not despite_problems:
-                raise MissionError(
-                    f"the program of mission {self.id} has problems; approve it despite them, or change it"
-                )
+                mend = "approve it despite them, or change it"
+                raise MissionError(f"the program of mission {self.id} has problems; {mend}")
             self._step(MissionState.APPROVED, "be approved")
             if by:
                 self.note(f"approved by {by}")
@@ -237,15 +235,13 @@ class Mission:
             OSError: an event could not be logged or printed, so the robot was stopped.
         """
         guard = RuleGuard(rules, room_map or NO_ROOMS, contracts) if rules or contracts else None
-        live = LiveRobot(
-            reserved.robot, self._write, place=place, guard=guard, room_map=room_map, button=self.stop_button
-        )
+        robot, button = reserved.robot, self.stop_button
+        live = LiveRobot(robot, self._write, place=place, guard=guard, room_map=room_map, button=button)
         with self._writing:
             if self.state is MissionState.APPROVED:
                 reserved.use()
-                self._live, self.stop_button.robot = live, reserved.robot
-            will = reserved.robot.if_tool_dies
-            address = normalize_address(reserved.robot.address)
+                self._live, button.robot = live, robot
+            will, address = robot.if_tool_dies, normalize_address(robot.address)
             self._step(MissionState.RUNNING, "run", if_tool_dies=will, place=place, address=address)
         if contracts:
             self._write("contract", contracts=[contract_data(contract) for contract in contracts])
@@ -274,16 +270,14 @@ class Mission:
                 if not isinstance(error, StoppedError):  # else a press has already stopped the robot
                     live.stop()
             finally:
-                self._end(
-                    live, MissionState.FAILED, _reason(error), None, is_lost=isinstance(error, RobotLostError)
-                )
+                is_lost = isinstance(error, RobotLostError)
+                self._end(live, MissionState.FAILED, _reason(error), None, is_lost=is_lost)
         else:
             done = outcome.status is Status.FINISHED
             why = outcome.error or RunError("", "")
             reason = live.report_unkept() if done else f"{why.kind}: {visible(why.message)}"
-            self._end(
-                live, MissionState.DONE if done else MissionState.FAILED, reason, outcome.line, is_lost=False
-            )
+            state = MissionState.DONE if done else MissionState.FAILED
+            self._end(live, state, reason, outcome.line, is_lost=False)
 
     def _run_program(self, live: LiveRobot) -> Outcome:
         with closing(Worker(one_process_per_run=True)) as worker:

@@ -91,9 +91,8 @@ def find_program_effects(
                 return SimulatedRobot(world, LIMITED_SIMULATION, skills, guard=guard)
 
             ended = pool.here().run_all([(program, [partial(new_robot, program)]) for program in some])
-            return [
-                _effect(end, guards[source].violations) for source, (end,) in zip(some, ended, strict=True)
-            ]
+            outcomes = zip(some, ended, strict=True)
+            return [_effect(end, guards[source].violations) for source, (end,) in outcomes]
 
         yield from pool.map_distinct(run_some, programs, name=digest)
 

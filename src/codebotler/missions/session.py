@@ -152,10 +152,9 @@ class MissionSession(SharedView):
                 raise MissionError(f"there is no option {answer + 1}; choose 1 to {len(question.options)}")
             if answer != "none" and more.strip():
                 raise MissionError('text can be added only to "none of these"; choose that, or omit the text')
-            self.is_changed_by_person |= bool(more.strip())
-            self._next_task = partial(
-                self._take_answer, question=question, answer=answer, more=" ".join(more.split())
-            )
+            more = " ".join(more.split())
+            self.is_changed_by_person |= bool(more)
+            self._next_task = partial(self._take_answer, question=question, answer=answer, more=more)
             self._change(question=None, busy=CHECKING)
 
     def approve(
@@ -341,9 +340,8 @@ class MissionSession(SharedView):
         """Take one of several programs, or ask the person which one is meant if they differ."""
         self._show(busy="comparing the programs")
         refused = () if self._rejected is None else self._rejected.programs
-        how = CheckSettings(
-            skills=self._robot.skills, house_rules=self._view.rules_in_force, is_wanted=self._is_wanted
-        )
+        skills, rules = self._robot.skills, self._view.rules_in_force
+        how = CheckSettings(skills=skills, house_rules=rules, is_wanted=self._is_wanted)
         try:
             groups = compare_candidates(programs, how, self._view.room_map, refused)
         except (UserError, UnwantedCheckError):

@@ -105,9 +105,8 @@ def _mission_folders(home: Path) -> list[Path]:
     except FileNotFoundError:
         return []
     except NotADirectoryError:
-        raise UserError(
-            "this is a file, not a folder of missions; set CODEBOTLER_HOME to another folder", file=folder
-        ) from None
+        sentence = "this is a file, not a folder of missions; set CODEBOTLER_HOME to another folder"
+        raise UserError(sentence, file=folder) from None
     return [path for path in found if os.path.exists(path / SUMMARY_FILE)]  # noqa: PTH110 - raises nothing
 
 
