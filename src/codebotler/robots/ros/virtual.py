@@ -74,9 +74,8 @@ class VirtualRobot:
     def start(self) -> bool:
         """Offer the skills. Return whether this started a master. Raise NotReadyError if ROS is missing."""
         worker = self._worker = self._start_servers()
-        self._threads = [
-            threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)
-        ]
+        jobs = (self._listen, self._work)
+        self._threads = [threading.Thread(target=job, args=(worker,), daemon=True) for job in jobs]
         for thread in self._threads:
             thread.start()
         return bool(worker.about["has_master"])

@@ -71,9 +71,8 @@ class RosWorker:
                 start_new_session=True,
             )
         except OSError as error:
-            raise NotReadyError(
-                f"{python} does not start: {error.strerror}; name the robot's Python with --ros-python"
-            ) from None
+            why = f"{python} does not start: {error.strerror}"
+            raise NotReadyError(f"{why}; name the robot's Python with --ros-python") from None
         pipes = (self._process.stdin, self._process.stdout, self._process.stderr)
         self._stdin, self._stdout, self._stderr = cast("tuple[IO[str], IO[str], IO[str]]", pipes)
         jobs = (self._listen, self._keep_errors, self._send_heartbeats)

@@ -133,11 +133,8 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     kind, name = named[0]
     for other in {*MESSAGE_KEYS.values()} - {MESSAGE_KEYS[kind]}:
         if getattr(form, other):
-            raise file.wrong(
-                f'this skill has "{kind}", so name the fields of its message in "{MESSAGE_KEYS[kind]}"',
-                *at,
-                other,
-            )
+            sentence = f'this skill has "{kind}", so name the fields of its message in "{MESSAGE_KEYS[kind]}"'
+            raise file.wrong(sentence, *at, other)
     if skill.returns.annotation != "None" and not form.result:
         raise file.wrong(f'in "result", name the field of the answer that {skill.signature} returns', *at)
     request = getattr(form, MESSAGE_KEYS[kind])

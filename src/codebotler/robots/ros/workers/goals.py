@@ -219,10 +219,8 @@ class SkillWorker:
     def pass_on(self, goal: Goal, feedback: dict[str, Any]) -> None:
         """Report the text and number fields of a feedback message, at most twice a second."""
         plain = {name: value for name, value in feedback.items() if not isinstance(value, (dict, list))}
-        text = ", ".join(
-            f"{name}: {value:.4g}" if isinstance(value, float) else f"{name}: {value}"
-            for name, value in plain.items()
-        )
+        shown = {name: f"{value:.4g}" if isinstance(value, float) else value for name, value in plain.items()}
+        text = ", ".join(f"{name}: {value}" for name, value in shown.items())
         now = time.monotonic()
         if text and not goal.is_over and now - goal.last_feedback > FEEDBACK_INTERVAL:
             goal.last_feedback = now

@@ -89,10 +89,8 @@ class Ros2Graph:
 
     def explain_missing(self, server: str, type_name: str) -> str:
         """Return a message that explains why a server cannot be reached."""
-        return (
-            f"there is no {provider_word(type_name)} of {type_name} at {server}; start it, or compare "
-            "ROS_DOMAIN_ID and the definitions on both sides"
-        )
+        mend = "start it, or compare ROS_DOMAIN_ID and the definitions on both sides"
+        return f"there is no {provider_word(type_name)} of {type_name} at {server}; {mend}"
 
     def call_soon(self, function: Callable[..., object], *arguments: Any) -> None:
         """Schedule a function call in the executor's thread."""

@@ -159,10 +159,8 @@ def _check_action(name: str, definition: str) -> Any:
     for part, fields in zip((spec.Goal, spec.Result), fields_of(definition)):
         installed = list(part.get_fields_and_field_types())
         if installed != fields:
-            raise SetupError(
-                f"{name} has the fields {', '.join(installed) or 'none'}, "
-                f"but {', '.join(fields) or 'none'} are needed; build its package again"
-            )
+            has, needs = (", ".join(names) or "none" for names in (installed, fields))
+            raise SetupError(f"{name} has the fields {has}, but {needs} are needed; build its package again")
     return spec
 
 
