@@ -186,9 +186,8 @@ class RobotWithFace:
     @property
     def missing(self) -> Mapping[str, str]:
         """Maps each skill that the wrapped robot lacks to the reason, without the spoken skills."""
-        return {
-            skill: why for skill, why in self._robot.missing.items() if _speech_of(self.skills[skill]) is None
-        }
+        missing = self._robot.missing.items()
+        return {skill: why for skill, why in missing if _speech_of(self.skills[skill]) is None}
 
     def connect(self) -> None:
         """Connect the wrapped robot and clear the screens."""

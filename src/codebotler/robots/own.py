@@ -143,9 +143,8 @@ class OwnRobot:
         if not self._stopped:
             return
         if not self._stop_returned.wait(STOP_SECONDS):
-            raise RobotLostError(
-                f"{self.name}.stop has not returned after {STOP_SECONDS:.0f} s; {STOP_BY_HAND}"
-            )
+            late = f"has not returned after {STOP_SECONDS:.0f} s"
+            raise RobotLostError(f"{self.name}.stop {late}; {STOP_BY_HAND}")
         if self.failed_stop:
             raise RobotLostError(self.failed_stop)
         raise CancelledError
@@ -257,9 +256,8 @@ def _make_body(path: Path, kind: str) -> Any:  # noqa: ANN401 - of a user's clas
     line = inspect.getsourcelines(body)[1]
     for method, why in REQUIRED_METHODS.items():
         if not callable(getattr(body, method, None)):
-            raise UserError(
-                f"{kind} has no method {method}, {why}; add def {method}(self)", file=path, line=line
-            )
+            sentence = f"{kind} has no method {method}, {why}; add def {method}(self)"
+            raise UserError(sentence, file=path, line=line)
     try:
         return body()
     except Exception as error:

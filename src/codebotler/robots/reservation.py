@@ -83,11 +83,9 @@ class Reservation:
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            holder = os.pread(self._lock, 1_000, 0).decode(errors="replace")
-            raise NotReadyError(
-                f"another tool ({holder or 'just started'}) has a mission open with the robot "
-                f"{self.robot.name}; wait until that mission has ended, or stop it there"
-            ) from None
+            holder = os.pread(self._lock, 1_000, 0).decode(errors="replace") or "just started"
+            why = f"another tool ({holder}) has a mission open with the robot {self.robot.name}"
+            raise NotReadyError(f"{why}; wait until that mission has ended, or stop it there") from None
         os.truncate(self._lock, 0)
         holder = f"process {os.getpid()}, since {datetime.now().astimezone():%H:%M:%S}"
         os.pwrite(self._lock, holder.encode(), 0)
@@ -107,9 +105,8 @@ def lock_folder() -> Path:
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
     if not _is_ours(folder):
-        raise NotReadyError(
-            f"{folder}, which holds robot locks, must be a folder that only you can write to; remove it"
-        )
+        needed = "must be a folder that only you can write to"
+        raise NotReadyError(f"{folder}, which holds robot locks, {needed}; remove it")
     return folder
 
 

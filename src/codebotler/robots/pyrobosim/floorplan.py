@@ -103,10 +103,9 @@ def _floor(name: str, footprint: Sequence[XY]) -> Polygon:
     floor = _shrink(outer, WALL_THICKNESS / 2) if outer.is_valid else Polygon()
     passable = _shrink(floor, PASSAGE_DEPTH)
     if floor.geom_type != "Polygon" or passable.geom_type != "Polygon" or passable.is_empty:
-        raise NotReadyError(
-            f'the room "{name}" is too narrow; make its footprint wider than '
-            f"{WALL_THICKNESS + 2 * PASSAGE_DEPTH:g} m everywhere, without crossing edges"
-        )
+        least = WALL_THICKNESS + 2 * PASSAGE_DEPTH
+        mend = f"make its footprint wider than {least:g} m everywhere, without crossing edges"
+        raise NotReadyError(f'the room "{name}" is too narrow; {mend}')
     return floor
 
 
