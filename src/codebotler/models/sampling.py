@@ -84,7 +84,6 @@ def _check_url(url: str) -> None:
         parts = urlsplit(url)
         is_valid = parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.port != 0
     if not is_valid or any(mark in url for mark in "@?#"):
-        raise UserError(
-            "the base URL must be http:// or https:// with a host and port, as in http://localhost:8000/v1; "
-            "remove any password or query (no @, ? or #), and put keys into the environment"
-        )
+        form = "must be http:// or https:// with a host and port, as in http://localhost:8000/v1"
+        mend = "remove any password or query (no @, ? or #), and put keys into the environment"
+        raise UserError(f"the base URL {form}; {mend}")

@@ -93,10 +93,8 @@ class ChatModel:
             failed = find_model_error(error) or mention_proxy(self._convert(error), self.settings.base_url)
             if not _is_filtered(error):
                 raise failed from None
-            latency = time.monotonic() - start
-            return make_reply(
-                failed.sentence, Usage(), latency, None, known_kind="filtered", has_answer=False
-            )
+            text, latency = failed.sentence, time.monotonic() - start
+            return make_reply(text, Usage(), latency, None, known_kind="filtered", has_answer=False)
         reply = self._reply(response, chunks, time.monotonic() - start)
         return turn_of(reply, response) if isinstance(prompt, ToolPrompt) else reply
 

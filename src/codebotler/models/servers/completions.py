@@ -78,10 +78,8 @@ class CompletionsModel:
             failed = find_model_error(error) or mention_proxy(self._convert(error), self.settings.base_url)
             if not isinstance(error, openai.APIStatusError) or not is_filtered(error.status_code, error.body):
                 raise failed from None
-            latency = time.monotonic() - start
-            return make_reply(
-                failed.sentence, Usage(), latency, None, known_kind="filtered", has_answer=False
-            )
+            text, latency = failed.sentence, time.monotonic() - start
+            return make_reply(text, Usage(), latency, None, known_kind="filtered", has_answer=False)
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
             fault = f"the server sent invalid JSON ({error})"
             raise model_error(self.name, fault, is_temporary=True) from None
