@@ -156,11 +156,8 @@ def _nesting_flaw(error: Exception) -> Flaw:
 
 def task_definitions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
     """Return the definitions of `task_program` at module level."""
-    return [
-        node
-        for node in tree.body
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == TASK_FUNCTION
-    ]
+    functions = (node for node in tree.body if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
+    return [function for function in functions if function.name == TASK_FUNCTION]
 
 
 def module_bound_names(source: str) -> set[str]:

@@ -89,11 +89,8 @@ def arguments_of_event(skill: Skill, event: Event) -> list[Scalar | tuple[str, .
     row, given = skill.recording, dict[str | None, Scalar | tuple[str, ...]]()
     if row is not None:
         given = dict(zip(row.more, event.more, strict=False))
-        given |= {
-            row.text: event.text,
-            row.options: tuple(option.text for option in event.options),
-            row.to: event.to or "",
-        }
+        options = tuple(option.text for option in event.options)
+        given |= {row.text: event.text, row.options: options, row.to: event.to or ""}
     return [given.get(parameter.name, "") for parameter in skill.parameters]
 
 

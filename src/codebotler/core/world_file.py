@@ -258,9 +258,8 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
     row = skills.get(name)
     if row is None or not row.is_random:
         raise ValueError(f"{name} is not a skill with an empty body; set the facts that its function reads")
-    if len(given) != len(row.parameters) or not all(
-        parameter.type.fits(one) for parameter, one in zip(row.parameters, given, strict=True)
-    ):
+    taken = zip(row.parameters, given, strict=True)
+    if len(given) != len(row.parameters) or not all(parameter.type.fits(one) for parameter, one in taken):
         raise ValueError(f"the arguments of {name} are wrong; its signature is {row.signature}")
     kinds = [kind for kind, _ in row.fails]
     if value in kinds or (row.returns.base is not None and row.returns.fits(value)):
