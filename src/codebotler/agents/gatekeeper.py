@@ -108,7 +108,7 @@ class Gatekeeper:
             why = f"; mission {view.id} is {view.phase}" if view.id else view.error and f"; {view.error}"
             raise MissionError(f"no mission is waiting or running{why}; propose a new one")
         if session.view.digest != digest:
-            raise MissionError("the current mission has another digest; call follow_mission to see it")
+            raise MissionError("the current mission has another digest; call follow_mission for that digest")
         return session
 
     def find_steps(self, key: str) -> tuple[MissionSession, Steps]:
@@ -200,7 +200,10 @@ class Gatekeeper:
         return await asyncio.wrap_future(made)
 
     def report(self, session: MissionSession | None, after: int = 0) -> MissionReport:
-        """Describe a session's mission for agents, with up to 1,000 events after the first `after` ones."""
+        """Describe a session's mission for agents. None means that there is no mission yet.
+
+        The report skips the first `after` events, and contains up to 1,000 of the next events.
+        """
         view = SessionView() if session is None else session.view
         events = [] if session is None else session.events()
         seen = min(len(events), after + MAX_REPORTED_EVENTS)

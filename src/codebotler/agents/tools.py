@@ -155,7 +155,7 @@ async def continue_mission(
         if isinstance(answer, AcceptedElicitation) and not isinstance(answer.data, NotAsked):
             past = past.resolve(happened=answer.data.answer == "it happened")
         if past.unsure is not None:
-            raise UserError(f"{past.unsure_step_text}; ask a person to answer on the page {gatekeeper.page}")
+            raise UserError(f"{past.unsure_step_text}; ask a person to answer at {gatekeeper.page}")
         if not program.strip() and not past.instruction:
             raise UserError(f"mission {past.mission} has no instruction; send a program for the rest")
         author = agent_name(ctx) if program.strip() else ""

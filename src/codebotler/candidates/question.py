@@ -254,9 +254,9 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
 def describe_differences(
     samples: Sequence[Sample], behaviours: Sequence[Behaviour]
 ) -> list[tuple[str, frozenset[int]]]:
-    """Return how each run differs, such as `ends in kitchen`, and the numbers, from 1, of its own steps.
+    """Return how each run differs, such as `ends in kitchen`, and the numbers of the steps that differ.
 
-    All runs are in the same world. The own steps of a run are those that not all runs share.
+    All runs are in the same world. Steps are counted from 1; those that all runs share are left out.
     """
     said, traces = [one.said for one in behaviours], [one.outcome.trace for one in samples]
     rooms = {room for one in said for other in said for room, _ in one - other}  # where statements differ

@@ -89,7 +89,7 @@ def ending_view(ended: SessionView) -> Group:
 
 
 def continue_view(ended: SessionView) -> Text:
-    """Return the command that does the rest of a mission, on a line that is never wrapped."""
+    """Return a line that tells how to continue a mission. The line is never wrapped, so it can be copied."""
     options = "add --world, --robot, --model and --base-url as you gave them now"
     command = f"`codebotler continue {ended.id}` does the rest; {options}"
     return Text(command, "dim", no_wrap=True, overflow="ignore")

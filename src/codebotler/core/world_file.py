@@ -130,7 +130,7 @@ def _answer(form: AnswerFile) -> Answer:
 
 
 class PlaceFile(_Form):
-    """A place in a world file, such as a table: a name, perhaps with corners and a standing point."""
+    """A place in a world file, such as a table: its name, and optionally its corners and where to stand."""
 
     name: NamePattern
     footprint: Annotated[list[Corner], Field(min_length=3)] | None = None
@@ -257,7 +257,7 @@ def _expect_possible(name: str, given: list[object], value: object, skills: Skil
     """Raise ValueError if a call cannot return this value, or if the skill's code computes its result."""
     row = skills.get(name)
     if row is None or not row.is_random:
-        raise ValueError(f"{name} is not a skill with an empty body; set the facts that its function reads")
+        raise ValueError(f"{name} is not a skill with an empty body; set facts that it reads, not its result")
     taken = zip(row.parameters, given, strict=True)
     if len(given) != len(row.parameters) or not all(parameter.type.fits(one) for parameter, one in taken):
         raise ValueError(f"the arguments of {name} are wrong; its signature is {row.signature}")

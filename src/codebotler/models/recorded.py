@@ -145,9 +145,10 @@ def is_recorded(name: str) -> bool:
 
 
 def open_recorded(name: str, folder: Path | None = None) -> RecordedModel:
-    """Open a model that replays hand-written programs, by its name. Raise UserError for an unknown name.
+    """Open a model that replays hand-written programs. Raise UserError for an unknown name.
 
-    `recorded:FOLDER` reads FOLDER; `recorded:careful` and `recorded:hasty` also read `folder`, if given.
+    The name `recorded:DIR` stands for the programs in the folder DIR. `recorded:careful` and `recorded:hasty`
+    stand for the built-in programs, and for those in `folder` if it is given.
     """
     short = name.removeprefix("recorded").removeprefix(":") or RECORDED_NAMES[0]
     if short not in RECORDED_NAMES and Path(short).is_dir():

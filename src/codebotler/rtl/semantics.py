@@ -15,7 +15,7 @@ from codebotler.rtl import formulas
 
 @dataclass(eq=False, repr=False)
 class Inconclusive(Exception):  # noqa: N818 - a third verdict, not a mistake of the caller
-    """Raised if the result of a formula depends on a question's option that is not a string.
+    """Raised if it is unknown whether a formula holds, because an option of a question is not a string.
 
     Args:
         event: the question's position in the trace, counted from 0.
@@ -137,7 +137,10 @@ def bounding_event(scope: formulas.Scope, trace: Trace, span: range) -> int | No
 
 
 def narrow(scope: formulas.Scope, at: int | None, span: range) -> range:
-    """Return the part of `span` inside a scope. `at` is the position of its bounding event, or None."""
+    """Return the positions of `span`, a part of a trace, that are inside a scope.
+
+    The scope begins or ends at the event with the position `at`, or `at` is None if there is no such event.
+    """
     if at is None:
         return range(span.stop, span.stop) if scope.is_only else span
     return range(span.start, at) if scope.is_before else range(at + 1, span.stop)

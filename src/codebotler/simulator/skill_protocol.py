@@ -34,7 +34,7 @@ OVERRUN = 100  # requests after a limit, such as from `finally`, until the child
 
 
 class SkillProtocol:
-    """Answers the requests of one new process, which runs one program, until the run ends."""
+    """Answers the skill calls of a program that runs in an isolated process, until the run ends."""
 
     def __init__(self, child: IsolatedProcess, code: bytes, robot: SkillPerformer) -> None:
         self.child, self.robot, self.limits = child, robot, robot.settings.limits
@@ -127,7 +127,7 @@ def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:
     """Convert a call's arguments for the robot. Raise ProtocolError if they do not fit the skill."""
     if len(values) != len(skill.parameters):
         raise ProtocolError(
-            f"a call of {skill.name} has {len(values)} arguments, not {len(skill.parameters)}"
+            f"{skill.name} got {len(values)} arguments, but has {len(skill.parameters)} parameters"
         )
     arguments: list[Argument] = []
     for parameter, value in zip(skill.parameters, values, strict=True):

@@ -123,7 +123,7 @@ def warned() -> Iterator[None]:
 
 
 class Button(PlainText):
-    """A button that calls `pressed`, with the value of the JavaScript `emits` if given, and shows errors."""
+    """A button that calls `pressed` and shows its errors. `emits` is JavaScript for an argument, if any."""
 
     def __init__(self, text: str, pressed: Callable[..., Any], kind: str = "", *, emits: str = "") -> None:
         async def press(event: GenericEventArguments) -> None:

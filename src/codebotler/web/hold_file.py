@@ -58,7 +58,7 @@ class HoldFile:
         return self._is_pending or self._path.exists()
 
     def write(self, warning: str = "") -> None:
-        """Write the file in a thread, so that no STOP waits for the disk. "" keeps the old warning."""
+        """Write the file in a thread, because STOP must not wait. Keep the old warning if `warning` is ""."""
         self._is_pending = True
         self._writer = threading.Thread(target=self._write, args=(warning,), daemon=True)
         self._writer.start()

@@ -178,7 +178,7 @@ def measurement_data(
     settings: ClarifySettings,
     prompts: Sequence[PromptShares],
 ) -> dict[str, Any]:
-    """Return a measurement as JSON data: settings, means over the prompts, and the shares of each prompt."""
+    """Return the result of `roboeval clarify` as JSON data: settings, shares of each prompt, and means."""
     questions = [(one["asked"], one["mattered"]) for one in prompts if one["mattered"] is not None]
     asked = sum(share for share, _ in questions)
     tokens = [one["tokens"] for one in prompts if one["tokens"] is not None]
@@ -206,7 +206,7 @@ def store_measurement(run: RunFolder, suite: Suite, data: dict[str, Any]) -> Pat
 
 
 def read_measurements(results: Results) -> Iterator[tuple[ClarifyMeasurement, bool]]:
-    """Yield each stored measurement of a run, and whether its completions and suite are still the same."""
+    """Yield each stored measurement of a run, with False if the completions or suite have changed since."""
     for path in sorted(results.run.questions(results.key or "").glob("*.json")):
         try:
             one = msgspec.json.decode(read_text(path), type=ClarifyMeasurement)

@@ -36,10 +36,11 @@ def evaluate_run(
 ) -> Iterator[Row]:
     """Judge the completions of a run that have no row yet, and yield all rows of `tasks` (None means all).
 
-    Rows of other tasks are kept, but `redo` first deletes all rows. If `ablated`, only common sense is
-    required. A completion that takes too long to judge gets no row, so that the next evaluation tries again.
-    Pass `completions` if the run has already been read. Raises UserError if earlier rows were judged by
-    another suite, or by other versions of codebotler or Python.
+    Rows of other tasks are kept, but `redo` first deletes all rows. If `ablated`, only the common-sense
+    requirements of the tasks apply. Programs run in `engine` or, without one, in `workers` processes here. A
+    completion that takes too long to judge gets no row, so that the next evaluation tries again. Pass
+    `completions` if the run has already been read. Raises UserError if earlier rows were judged by another
+    suite, or by other versions of codebotler or Python.
     """
     key = evaluation_key(suite, ablated=ablated)
     with run.writing():

@@ -101,7 +101,11 @@ def find_interruptions(worker: Worker, suite: Suite, one: Completion) -> list[In
 def find_first_right(
     worker: Worker, suite: Suite, completions: Iterable[Completion]
 ) -> Iterator[list[Interruption | FaultResult]]:
-    """Yield `find_interruptions` for each completion, or [] if an earlier one of its task was right."""
+    """Find interruptions only in the first right program of each task.
+
+    Yields the result of `find_interruptions` for each completion, such as [] for a wrong program. After the
+    first right program of a task, yields [] for the other completions of the task.
+    """
     done: set[str] = set()
     for one in completions:
         found = [] if one.task in done else find_interruptions(worker, suite, one)
@@ -117,7 +121,10 @@ def check_rest(worker: Worker, suite: Suite, program: str, room_map: RoomMap, be
 
 
 def try_continuation(worker: Worker, suite: Suite, one: Interruption, program: str | None) -> FaultResult:
-    """Check and run a program (None if missing) that completes a mission. Judge the whole mission."""
+    """Check and run a program that does the rest of an interrupted mission, and judge the whole mission.
+
+    The `end` of the result is `missing` if `program` is None, and `rejected` if the check finds problems.
+    """
     if program is None:
         return replace(one.result, end="missing")
     problems = check_rest(worker, suite, program, one.room_map, one.past.program).problems

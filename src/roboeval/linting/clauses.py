@@ -17,7 +17,7 @@ Span = tuple[int, int]
 
 
 def uncovered_clauses(task: Task) -> Iterator[tuple[int, str]]:
-    """Yield each clause of the task's prompts that no check covers, after the index of its prompt.
+    """Yield each clause (part of a sentence) in a task's prompts that no check covers: (prompt index, text).
 
     A requirement covers each clause from which it quotes a word. A fact in `covered_by` covers each clause
     in which its regex matches a word. Parts such as `.*`, which match any word, do not count.

@@ -26,7 +26,7 @@ MAX_DRAWN_RUNS = 8  # readers cannot tell apart more colours
 
 @dataclass(frozen=True, eq=False)
 class JudgedRun:
-    """A run in a report, with its verdicts and any verdicts by an ablation, another suite or house rules."""
+    """A judged run in a report. It may also have verdicts from an ablation, another suite or house rules."""
 
     results: Results
     table: pl.DataFrame  # the column `accepted` is null for unchecked programs
@@ -124,7 +124,7 @@ def coverage_of(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def read_labels(texts: Sequence[str], paths: Sequence[Path]) -> dict[int, str]:
-    """Parse labels such as `my-run=Mine`. The result maps the index of a run in `paths` to its label."""
+    """Parse labels such as `my=Mine`, by index in `paths`. Raise UserError if one does not fit one run."""
     labels: dict[int, str] = {}
     names = [{str(path), path.resolve().name} for path in paths]
     for text in texts:
@@ -151,7 +151,7 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
 
 
 def name_runs(runs: Sequence[JudgedRun], labels: Mapping[int, str] = {}) -> list[JudgedRun]:
-    """Name each run by its label, or else its model or folder. Add the folder or a number to duplicates."""
+    """Give each run a unique name: its label (`labels` is by index in `runs`), or its model or folder."""
     given = [labels.get(at) or run.model or run.folder for at, run in enumerate(runs)]
     plain = [short_name(name, MAX_RUN_NAME) for name in given]
     with_folder = [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)]

@@ -150,7 +150,7 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
 
 
 def expect_no_others(out: Path) -> None:
-    """Raise UserError if a folder is neither empty nor a report, because a report replaces files."""
+    """Raise UserError if a folder has files but no report, so that a new report does not replace them."""
     if not out.is_dir():
         return
     others = sorted(one.name for one in out.iterdir() if not one.name.startswith("."))

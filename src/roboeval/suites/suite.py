@@ -43,17 +43,20 @@ class HouseRules:
         for rule in self.rules:
             if rule.inside:
                 why = 'uses "inside", which evaluations do not support'
-                raise UserError(f'the rule "{rule.name}" {why}; remove the rule')
+                raise UserError(f'the rule "{rule.name}" {why}; use a copy of the file without it')
 
     @classmethod
     def read(
         cls, path: Path, skills: SkillTable = SKILLS, rooms: Sequence[str] = (), *, of_suite: bool = False
     ) -> HouseRules:
-        """Read a file of house rules. Raise UserError if a rule is invalid or names a room not in `rooms`."""
+        """Read a file of house rules. Raise UserError if a rule is invalid or names a room not in `rooms`.
+
+        Empty `rooms` allow all rooms. With `of_suite`, for a suite's own rules, the file may have any name.
+        """
         rules = read_rules(path, skills, rooms)
         if not of_suite and not re.fullmatch(r"[a-z0-9][a-z0-9-]*", path.stem):
-            mend = "use lower-case letters, digits and dashes"
-            raise UserError(f"the file name is not valid for house rules; {mend}", file=path)
+            mend = "rename the file with only lower-case letters, digits and dashes"
+            raise UserError(f'the name "{path.stem}" is not valid for house rules; {mend}', file=path)
         return cls("" if of_suite else path.stem, rules, hashlib.sha256(path.read_bytes()).hexdigest())
 
 

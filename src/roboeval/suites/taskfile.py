@@ -127,7 +127,8 @@ def _phrases(form: SampledTaskFile, file: YamlFile, words: Sequence[str]) -> dic
     phrases = {PEOPLE_PLACEHOLDER: rf"(?:{'|'.join(map(scope_flags, [*words, *names]))})s?"}
     for name, regexes in form.phrases.items():
         if not name.isidentifier() or name in {PEOPLE_PLACEHOLDER, START}:
-            raise file.wrong(f'"{name}" is not a valid name for phrases; rename it', "phrases", name)
+            why = "is reserved, or has other characters than letters, digits and _"
+            raise file.wrong(f'the name "{name}" {why}; rename the phrases', "phrases", name)
         phrases[name] = f"(?:{'|'.join(map(scope_flags, regexes))})"
     return phrases
 

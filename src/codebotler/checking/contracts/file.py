@@ -43,7 +43,7 @@ def read_contract(path: Path, skills: SkillTable = SKILLS) -> Contract:
 
 
 def contract_from(data: Mapping[str, Any], skills: SkillTable) -> Contract:
-    """Convert the `skills` part of a contract file to a contract. Raise UserError if it is not valid."""
+    """Make a contract from the value of `skills` in a contract file. Raise UserError if it is not valid."""
     return _contract_in(
         YamlFile(json.dumps({"version": 1, "skills": data}, ensure_ascii=False), "the contract"), skills
     )

@@ -30,12 +30,12 @@ PossibleValue: TypeAlias = ast.expr | None
 
 
 class PossibleValues:
-    """Finds the values that an expression may have, without regard to scopes and the order of statements.
+    """Finds the values that an expression may have. It ignores scopes and the order of statements.
 
     Args:
         tree: the program.
-        guess_entries: whether `rooms[0]` may be any element of `rooms`. For a dictionary, this is a wrong
-            guess, since its elements are its keys.
+        guess_entries: whether `x[0]` counts as any element of `x`; otherwise, `x[0]` stays as it is. For
+            a dictionary, this wrongly gives its keys, so use it only where some wrong values do no harm.
     """
 
     def __init__(self, tree: ast.Module, *, guess_entries: bool = False) -> None:

@@ -90,7 +90,7 @@ class _RoomNames:
         return [text for _, _, text in sorted(found - {A_ROOM}) if any(map(str.isalpha, text))]
 
     def texts(self, node: ast.expr) -> set[TextLiteral]:
-        """Return the line, column and text of each string that a node or its elements may be."""
+        """Return the strings that a node, or an element of its value, may be: their line, column and text."""
         found = set()
         for value in self.values.of(node):
             match value:

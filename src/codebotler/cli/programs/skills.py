@@ -33,7 +33,7 @@ SKILLS_TEMPLATE = Path(__file__).with_name("new-skills.txt").read_text()
 
 @dataclass(frozen=True)
 class SkillTrial:
-    """One outcome of a skill's example call, with the facts of the first world where it occurred."""
+    """One outcome of a skill's example call, such as `returns True`, and the facts of a world that had it."""
 
     outcome: str  # the outcome as a phrase, such as `returns True`
     facts: tuple[str, ...]  # the facts in the first world with this outcome

@@ -54,7 +54,10 @@ class Verb:
 
 
 def verb_of(template: str, parameters: Sequence[str], results: tuple[str, str], past: str = "") -> Verb:
-    """Build a verb from a template such as `open {door}`. `results` are words for False and True.
+    """Build a verb from a template such as `open {door}`.
+
+    `results` are the words for False and True, such as `("no", "yes")`. `past` is the past form, such as
+    `took`, if it is irregular.
 
     Raises:
         ValueError: the template has no verb, or braces around something other than a parameter.

@@ -18,9 +18,9 @@ UNKNOWN_RECORDING = Recording("", "text", names="thing")  # of a kind that no lo
 
 
 def phrase(event: Event, form: VerbForm, *, show: Callable[[str], str] = brief, quote: str = '"') -> str:
-    """Describe an event, such as `looked for "mug": found` or `asked "Tea?" [yes | no] → yes`.
+    """Describe an event, such as `looked for "mug": found`.
 
-    The result, if any, comes last. The forms `base` and `ing` put it in parentheses.
+    A result comes last. The forms `base` and `ing` put it in parentheses: `look for "mug" (found)`.
 
     Args:
         event: the event.

@@ -210,7 +210,7 @@ def export_mcap(
     clock: TimeSource,
     folder: Path | None = None,
 ) -> None:
-    """Write a mission to an MCAP file, atomically. Raise UserError if `path` is a file of another format."""
+    """Write a mission to an MCAP file, as `write_mcap` does. Raise UserError if `path` has another format."""
     expect_replaceable(path, b"\x89MCAP")
     whole = io.BytesIO()
     write_mcap(whole, summary, events, folder=folder, clock=clock)

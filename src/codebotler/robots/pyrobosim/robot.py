@@ -40,7 +40,7 @@ class Pyrobosim(Simulated):
     def perform(
         self, skill: str, arguments: Sequence[RobotArgument], feedback: Feedback = ignore_feedback
     ) -> RobotResult:
-        """Perform a skill. To pick or place something, first drive to the table in the room."""
+        """Perform a skill and return its result. Before `pick` or `place`, drive to the table in the room."""
         self._wait(0.0)
         room = self._robot.room = self._drivable.room or self._robot.room  # a drive may have been stopped
         if skill in {"pick", "place"}:

@@ -60,7 +60,7 @@ def samples(pattern: str) -> tuple[str, ...]:
 
 
 def counter_samples(pattern: str) -> list[str]:
-    """Return strings that a regex excludes by `(?!...)`, such as `grilled` for `(?!grilled)cheese`."""
+    """Return strings that a regex rules out by `(?!...)`, such as `grilled` for `(?!grilled)cheese`."""
     denied = (arguments[-1] for op, arguments in parse_tree(pattern) if str(op) == "ASSERT_NOT")
     words = (word.strip() for tree in denied for word in _spell_in_all_ways(tree)[:_MOST_SPELLED])
     return [*dict.fromkeys(filter(None, words))]

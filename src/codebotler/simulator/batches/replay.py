@@ -52,8 +52,8 @@ def message(
 ) -> tuple[SkillDescriptions, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]]:
     """Return the message that sends a batch of programs to the process that runs them.
 
-    It consists of all skills, the names of those that only the engine can execute, the pickled robots, and
-    each program's code with the indexes of its robots.
+    Its four parts are the descriptions of all skills, the names of those that only the engine can execute,
+    the pickled robots, and a list of each program's code with the indexes of its robots.
     """
     robot = programs[0][1][0]
     setups: dict[tuple[int, ...], Setup] = {}

@@ -78,8 +78,8 @@ class RuleViolationError(RobotError):
     Args:
         rule: the rule in question.
         event: the event that breaks the rule, or None if the rule is broken at the end of a mission.
-        objection: the verb that links rule and event: `forbids`, `cannot judge` or `is broken by`.
-        why: the reason why the rule cannot be judged, as the end of a sentence: "since ...".
+        objection: the verb in the message: the rule `forbids`, `cannot judge` or `is broken by` the event.
+        why: why the rule cannot be judged: a clause for the message, such as `since ...`.
     """
 
     def __init__(

@@ -31,7 +31,10 @@ SCOPE_NODES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 def prepared(
     source: str, *, lowercase: bool, skills: frozenset[str] | None = None
 ) -> tuple[types.CodeType, bool]:
-    """Compile a program to count its steps. Also return if it may share a process (not without `skills`)."""
+    """Compile a program so that its steps are counted. Also return whether it may share a process.
+
+    `lowercase` makes its string literals lowercase. Without the names of the `skills`, no process is shared.
+    """
     if "\0" in source:
         line = source.count("\n", 0, source.index("\0")) + 1
         raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))

@@ -80,7 +80,7 @@ def start_again(descriptors: list[int]) -> NoReturn:
 
 
 def arrange(descriptors: list[int]) -> None:
-    """Renumber open descriptors from FIRST_DESCRIPTOR on, and close all higher ones."""
+    """Give descriptors the numbers FIRST_DESCRIPTOR, FIRST_DESCRIPTOR + 1 and so on. Close higher ones."""
     from fcntl import F_DUPFD, fcntl  # noqa: PLC0415 - not needed after the restart
 
     end = FIRST_DESCRIPTOR + len(descriptors)

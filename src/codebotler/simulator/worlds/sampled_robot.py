@@ -280,7 +280,10 @@ class SampledRobot(SimulatedRobot):
         return [] if means_anybody(entity) or meant_by(entity, known, plain=True) else fitting
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return things that fit `is_` in the room `where` (default: anywhere). What is there is random."""
+        """Return the things in the room `where` that fit `is_`, such as `red`; by default, all everywhere.
+
+        Whether a thing is in a room is chosen at random when the program first looks for it.
+        """
         return self._all_of(self.room_map.things, where, is_ or "thing", is_person=False)
 
     def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:
@@ -342,7 +345,7 @@ class SampledRobot(SimulatedRobot):
         self.explored[goal].people |= {who, SOMEBODY}
 
     def ask(self, person: str, question: str, options: Sequence[object]) -> int:
-        """Return a random option's index. With no prior look, assume the person is here, unless strict."""
+        """Return a random option's index. A person never looked for is here (random in strict worlds)."""
         person, options = as_text(person), to_options(options)
         who = normalized(person)
         if not options or not self._answers(who):
@@ -377,7 +380,7 @@ class SampledRobot(SimulatedRobot):
         return is_there
 
     def take(self, obj: str) -> None:
-        """Pick up an object. With no prior look, assume that it is here (random in strict worlds)."""
+        """Pick up an object. If the program never looked for it, it is here (random in strict worlds)."""
         name = normalized(obj)
         if self.held is None and self.is_here(name) is None and self._lies_there(name):
             self._add(name, self.room)

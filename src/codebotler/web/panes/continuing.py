@@ -35,7 +35,7 @@ class ContinueButton(Button):
         self._console, self._mission, self._model = console, mission, model
 
     def show(self, view: SessionView) -> None:
-        """Show the button if this mission, or else an unfinished one before it, can be continued."""
+        """Show the button if this mission or, if not, an earlier one can be continued. Otherwise, hide it."""
         is_other = not (has_rest(view) or view.progress.has_begun or view.past)
         aside = self._console.unfinished if is_other else ""
         self._mission = aside or view.id or ("" if view.past is None else view.past.mission)

@@ -77,7 +77,10 @@ class Access:
         open_to_all: bool = False,
         is_private: bool = True,
     ) -> Access:
-        """Create an Access with these tokens, or random ones for None. Raise UserError if that is unsafe."""
+        """Create an Access with these tokens, or random ones for None. Raise UserError if that is unsafe.
+
+        With `open_to_all`, operators need no token. This requires `is_private`: only this machine has access.
+        """
         options = {Role.OPERATOR: operator, Role.FACE: face, Role.AGENT: agent}
         given = [token for token in options.values() if token is not None]
         if open_to_all and (any(given) or not is_private):

@@ -63,7 +63,7 @@ class OuterAddress:
         return f"{self.scheme}://{self.host}{self.prefix}/"
 
     def seen_from_outside(self, scope: Scope) -> dict[str, Any]:
-        """Return a copy of a request with the browser's scheme and path, such as https and `/robot/api`."""
+        """Return a reverse proxy's request with the browser's scheme and path, such as https and `/robot`."""
         path, raw = scope["path"], scope.get("raw_path") or b""
         if self.prefix and path != self.prefix and not path.startswith(f"{self.prefix}/"):
             path, raw = self.prefix + path, self.prefix.encode() + raw

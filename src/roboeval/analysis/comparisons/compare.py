@@ -100,7 +100,10 @@ def has_missions(table: pl.DataFrame) -> bool:
 
 
 def per_mission(table: pl.DataFrame) -> pl.DataFrame:
-    """Return a copy of a run's table in which each row (a completion in one world) counts as a completion."""
+    """Return a copy of a run's table in which each row counts as a completion of its own.
+
+    A row is one completion in one world. This makes programs comparable with agents' missions.
+    """
     kept = pl.col("failure_class").is_in([NO_PROGRAM_CLASS, AGENT_ERROR_CLASS])
     is_check = pl.col("failed_checks").is_not_null()
     is_robots = pl.col("status") == Status.ROBOT_ERROR.value
@@ -141,7 +144,7 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
 def pairs_to_compare(
     runs: Sequence[RunLike], pass_at_1: Callable[[RunLike], float]
 ) -> list[tuple[RunLike, RunLike]]:
-    """Return all pairs of runs or, if there are more than 10, pair each run only with the best by pass@1."""
+    """Return all pairs of runs. If these are more than 10, only pair each run with the best one by pass@1."""
     pairs = list(combinations(runs, 2))
     if len(pairs) <= MAX_PAIRS:
         return pairs

@@ -108,7 +108,7 @@ class MissionDesk:
 
 @contextlib.contextmanager
 def open_desk(run: RunFolder, plan: AgentPlan, model: str) -> Iterator[MissionDesk]:
-    """Lock a run, and yield a desk with its unfinished missions. `model` is the model name in saved rows."""
+    """Lock a run, and yield a desk that hands out its missions. `model` is the model name in saved rows."""
     with run.writing():
         about, _, todo = begin_batch(run, plan, model, UNKNOWN_SETTINGS)
         write_whole(run.about, to_text(about))

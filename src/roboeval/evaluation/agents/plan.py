@@ -45,7 +45,7 @@ class AgentPlan(GenerationPlan):
     has_turns: ClassVar[bool] = True
 
     def keys(self) -> list[CompletionKey]:
-        """Return the keys of all missions. With 3 worlds, indexes 0 to 2 are the first mission in each."""
+        """Return the keys of all missions. With 3 worlds, index 3 is the second mission in world 0."""
         first = GenerationPlan(self.suite, self.tasks, 1)
         prompts = [(task, prompt) for task, prompt, _ in first.keys()]  # noqa: SIM118 - a plan is no mapping
         return [

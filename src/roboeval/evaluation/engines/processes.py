@@ -93,7 +93,7 @@ def exit_with_parent(pipe: Connection) -> None:
 
 
 def run_batch(functions: bytes, isolation: Mapping[str, bool], works: Sequence[Work]) -> list[Any]:
-    """Run and judge programs with this process's worker. `functions` holds pickled `function` and `then`."""
+    """Run programs with this process's worker, by the pickled `function` and `then` of `map_distinct`."""
     function, then = load_functions(functions)
     return [then(ran) for ran in function(own_worker(**isolation), works)]
 

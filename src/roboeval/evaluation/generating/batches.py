@@ -138,7 +138,7 @@ def _row(
 def _expect_begun(run: RunFolder, suite: Suite) -> dict[str, Any]:
     about = about_of(run)
     if not batches(about):
-        raise UserError("this run was not started by `generate --requests`; name another", file=run.path)
+        raise UserError("this run was not started by `generate --requests`; name one that was", file=run.path)
     if about.get("suite") != suite.name:
         sentence = f'belongs to the suite "{about.get("suite")}"; select that suite with --suite'
         raise UserError(sentence, file=run.path)
@@ -169,7 +169,7 @@ def _answer(line: bytes, ids: Mapping[str, CompletionKey]) -> BatchAnswer:
         raise UserError("this line is not an answer from a batch endpoint; choose the endpoint's output file")
     if key is None:
         name = repr(row.get("custom_id"))
-        raise UserError(f"the request {name} was made by another run or with other settings; choose its run")
+        raise UserError(f"the request {name} is of another run or of other settings; name its run with --out")
     if not isinstance(response, dict):
         return key, 200, error
     status, body = response.get("status_code"), response.get("body")

@@ -268,5 +268,5 @@ class RequestLog:
                 case {"ended": [str(task), int(prompt), int(index)]}:
                     pending.discard((task, prompt, index))
                 case _:
-                    raise UserError("the line is not a request; delete the file", file=self.path, line=number)
+                    raise UserError("this request log is damaged; delete it", file=self.path, line=number)
         return pending

@@ -161,7 +161,10 @@ def _scenarios(suite: Suite, task: str, mission: MissionEnd | None, *, ablated: 
 
 
 def run_in_worlds(suite: Suite, worker: Worker, works: Sequence[Work], *, ablated: bool) -> list[Ran]:
-    """Run each program in all worlds of its task, and each mission of an agent only in its own world."""
+    """Run each program in the worlds in which it is judged, and return the outcomes of each.
+
+    These are all worlds of its task (or its ablation, if `ablated`), and only one for an agent's mission.
+    """
     planned = [
         (task, program, MissionEnd(int(end[0]), end[1]) if end else None) for task, program, *end in works
     ]

@@ -210,7 +210,7 @@ def tasks_to_judge(
 
 
 def with_judged_worlds(run: RunFolder, suite: Suite, *, ablated: bool) -> Suite:
-    """Return the suite with the number and seed of worlds that KEY.json records, if the run was judged."""
+    """Return a suite with the worlds in which it judged a run (see KEY.json), or unchanged if it did not."""
     path = run.manifest(evaluation_key(suite, ablated=ablated))
     drawn = suite.worlds, suite.seed
     if suite.worlds is None or not path.is_file():

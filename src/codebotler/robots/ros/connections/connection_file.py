@@ -133,7 +133,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     kind, name = named[0]
     for other in {*MESSAGE_KEYS.values()} - {MESSAGE_KEYS[kind]}:
         if getattr(form, other):
-            sentence = f'this skill has "{kind}", so name the fields of its message in "{MESSAGE_KEYS[kind]}"'
+            sentence = f'"{other}" does not fit "{kind}"; write the message in "{MESSAGE_KEYS[kind]}"'
             raise file.wrong(sentence, *at, other)
     if skill.returns.annotation != "None" and not form.result:
         raise file.wrong(f'in "result", name the field of the answer that {skill.signature} returns', *at)
@@ -141,7 +141,7 @@ def _call(file: YamlFile, skill: Skill, form: SkillForm, places: Places | None) 
     known = {parameter.name for parameter in skill.parameters}
     known |= {*PLACE_VARIABLES} if places and skill.is_drive else set()
     if known and not request:
-        raise file.wrong(f'write the message in "{MESSAGE_KEYS[kind]}", such as {{data: ${min(known)}}}', *at)
+        raise file.wrong(f'"{MESSAGE_KEYS[kind]}" is missing; add it, such as {{data: ${min(known)}}}', *at)
     for variable in CALL_VARIABLE.findall(str(request)):
         if variable not in known:
             lacks = "; name a file under places" if variable in PLACE_VARIABLES and skill.is_drive else ""

@@ -72,10 +72,12 @@ class Server:
 class SkillWorker:
     """Performs skills, one at a time. Subclasses implement at least `connect`, `send` and `listen`.
 
-    The first message has the `address`, the `node` name, the `calls` by skill, folders of `packages`, topics
-    for `pose`, `velocity` and `keepout`, the `frames` of poses from tf, whether to `cancel_all` goals, the
-    path `sign` of a file that names the server of a running goal, and the time limits `patience`, `silence`
-    and `longest`.
+    The first message, `start`, has these fields:
+    - for the connection: its `address`, the name of the `node`, `calls` by skill, and folders of `packages`;
+    - for the motion: the topics `pose`, `velocity` and `keepout`, and the `frames` of poses from tf;
+    - for goals that still run: whether to `cancel_all`, and `sign`, the path of a file that contains
+      the name of the server of a running goal;
+    - time limits in seconds: `patience`, `silence` and `longest`.
     """
 
     graph: Any
@@ -227,7 +229,7 @@ class SkillWorker:
             self.channel.send("feedback", id=goal.number, text=text)
 
     def finish(self, goal: Goal, state: str, values: Fields, text: str = "") -> None:
-        """End a goal with its final state: succeeded, aborted, rejected, cancelled or lost."""
+        """End a goal: succeeded, aborted, rejected, cancelled or lost. `values` is its result, `text` why."""
         if state == "lost":
             self.end(goal, "lost", text=text)
         elif state == "cancelled" or goal.cancelled is not None:

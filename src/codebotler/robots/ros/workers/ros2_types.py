@@ -150,8 +150,8 @@ def _import_class(name: str) -> Any:
         return getattr(importlib.import_module(f"{package}.{kind}"), plain)
     except (AttributeError, ModuleNotFoundError):
         where = Path(importlib.import_module(package).__file__ or "").parent
-        mend = f"add {plain}.{kind} and build the package again"
-        raise SetupError(f"{package} in {where} has no {kind} {plain}; {mend}") from None
+        mend = "add the file and build the package again"
+        raise SetupError(f"the package {package} in {where} lacks {plain}.{kind}; {mend}") from None
 
 
 def _check_action(name: str, definition: str) -> Any:

@@ -62,7 +62,7 @@ class Ros1Protocol:
             yield {"op": op, "topic": f"{server}/{name}", "type": of}
 
     def goal(self, server: str, _action: str, goal: str, fields: Fields) -> Fields:
-        """Return the message for the goal with id `goal`. Servers ignore a repeated id."""
+        """Return the message for a goal with id `goal` and content `fields`. Repeated ids are ignored."""
         msg = {"goal_id": {"id": goal, "stamp": NO_STAMP}, "goal": fields}
         return {"op": "publish", "topic": f"{server}/goal", "msg": msg}
 
@@ -99,7 +99,7 @@ class Ros2Protocol:
         yield from ()
 
     def goal(self, server: str, action: str, goal: str, fields: Fields) -> Fields:
-        """Return the message that sends the goal with the id `goal` and requests feedback."""
+        """Return the message that sends a goal with id `goal` and content `fields`, and requests feedback."""
         return {
             "op": "send_action_goal",
             "id": goal,
