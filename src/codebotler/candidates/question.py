@@ -215,15 +215,17 @@ def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, ...]:
     """Rank a world: by the number of options, their candidates, what a person cares about, and brevity.
 
     Options that all act, but in different rooms, differ more than those that only say something else. Where
-    an option does more, especially the first one, or looks in vain, a person sees better what it is for.
+    an option searches, or does more, especially the first one, a person sees better what it is for.
     """
     first, *others = (one.behaviours[number] for one in shown)
     cares = sum(bool(first.differences(other) & NOTICED_FIRST) for other in others)
     traces = [one.samples[number].outcome.trace for one in shown]
     acts = [[(event.kind, event.place) for event in trace if event.kind in NOTICED_KINDS] for trace in traces]
     sizes, apart = sum(one.size for one in shown), all(acts) and sum({*one} != {*acts[0]} for one in acts)
-    misses = any(event.found is False for trace in traces for event in trace)
-    return len(shown), sizes, cares, apart, len(acts[0]), sum(map(len, acts)), misses, -sum(map(len, traces))
+    looks = [[(event.text, event.found) for event in trace if event.kind == CHECK] for trace in traces]
+    searches = any((text, False) in some[:n] for some in looks for n, (text, seen) in enumerate(some) if seen)
+    actions, brevity = sum(map(len, acts)), -sum(map(len, traces))
+    return len(shown), sizes, cares, apart, searches, len(acts[0]), actions, brevity
 
 
 def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[str, ...]:

@@ -92,7 +92,7 @@ def repeated_steps(trace: Trace, room_map: RoomMap, remaining: Sequence[Outcome]
         counted = Counter(_sort(event, room_map) for event in one.trace)
         left |= Counter(dict.fromkeys(counted, UNBOUNDED_COUNT)) if one.status is Status.TIMEOUT else counted
     is_done = {_key(event): _is_done(event, done, later, room_map) for event in _distinct(trace)}
-    counts = Counter(_sort(event, room_map) for event in trace)
+    counts = Counter(_sort(event, room_map) for event in trace if not is_done.get(_key(event)))
     sorted_done = [(_sort(before, room_map), before) for before in done]
     for event in trace:
         sort = _sort(event, room_map)

@@ -100,6 +100,14 @@ def test_rule_stops_an_attempt_that_would_fail() -> None:
 def test_white_space_evades_no_rule(spelling: str) -> None:
     violate(robot(rule('not tr.Exists(pick("crown jewel"))')), "pick", spelling)
     violate(robot(rule('not tr.Exists(say("crown jewel"))')), "say", spelling)
+    violate(robot(rule(f"not tr.Exists(say({spelling.strip()!r}))")), "say", spelling)
+
+
+def test_white_space_in_the_name_of_a_room_evades_no_rule() -> None:
+    world = World((Room("hall"), Room("tea  kitchen")), "hall")
+    one = SimulatedRobot(world, guard=RuleGuard([rule('not tr.Exists(at("tea kitchen", say(".*")))')]))
+    one.perform("go_to", ["tea  kitchen"])
+    violate(one, "say", "hello")
 
 
 def test_rule_may_require_an_earlier_action_each_time() -> None:

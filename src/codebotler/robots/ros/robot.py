@@ -63,9 +63,9 @@ class RosRobot(RosCaller):
         if self.has_pose and pose is None:
             sentence = f"no pose arrived on {self.connection.pose}; start its publisher, or correct the topic"
         elif places is not None and pose is not None and pose.frame not in {"", places.frame}:
-            frames = f'in the frame "{pose.frame}", but the places are in "{places.frame}"'
+            frames = f'are in the frame "{pose.frame}", but the places are in "{places.frame}"'
             mend = "name another topic, or tf, under pose"
-            sentence = f"the poses on {self.connection.pose} are {frames}; {mend}"
+            sentence = f"the poses on {self.connection.pose} {frames}; {mend}"
         if sentence:
             self.disconnect()
             raise NotReadyError(sentence)

@@ -178,8 +178,10 @@ class RuleGuard:
 
     def find_violations(self, attempts: Sequence[Event], *, is_drive: bool) -> Iterator[RuleViolationError]:
         """Yield an error for each rule that a possible next event (a drive if `is_drive`) would break."""
-        attempts = tuple(map(_folded, attempts))
+        attempts = tuple(map(_trimmed, attempts))
         leaves = is_drive and any(map(self._leaves, attempts[1:] or attempts))
+        # Robots and contracts take names that differ only in white space for the same.
+        attempts = (*attempts, *(folded for one in attempts for folded in _folded(one)))
         for rule, monitor in self._history.monitors:
             is_judged = rule.when == "always" or (rule.when == "leaving" and leaves)
             for attempt in attempts if is_judged else ():
@@ -207,7 +209,7 @@ class RuleGuard:
         elif event.kind in KINDS_OF_MOVES:
             self._history.holding = event.text if event.kind == PICK else ""
         late = []
-        event = _folded(event)
+        event = _trimmed(event)
         for rule, monitor in self._history.monitors:
             if event.kind == INSIDE and not rule.inside:  # must not count as the last event for other rules
                 continue
@@ -294,12 +296,23 @@ def _label(room_map: RoomMap, request: str) -> str:
     return request if room is None else room_map.full_name(room)
 
 
-def _folded(event: Event) -> Event:
-    """Collapse the white space in all texts of an event, since robots and contracts ignore it, too."""
+def _trimmed(event: Event) -> Event:
+    """Strip surrounding whitespace from an event's options, answer and person."""
+    if event.to is None and not event.options:
+        return event
+    options = tuple([option._replace(text=option.text.strip()) for option in event.options])
+    answer, to = (None if text is None else text.strip() for text in (event.answer, event.to))
+    return replace(event, options=options, answer=answer, to=to)
+
+
+def _folded(event: Event) -> list[Event]:
+    """Return the event with single spaces in its texts; empty if it has no other white space."""
     options = tuple([option._replace(text=_fold(option.text)) for option in event.options])
-    answer, to = (None if text is None else _fold(text) for text in (event.answer, event.to))
-    text, more, holding = _fold(event.text), tuple(map(_fold, event.more)), _fold(event.holding)
-    return replace(event, text=text, options=options, answer=answer, to=to, more=more, holding=holding)
+    more, person = tuple(map(_fold, event.more)), None if event.to is None else _fold(event.to)
+    names = {"text": _fold(event.text), "place": _fold(event.place), "holding": _fold(event.holding)}
+    changed = {**names, "more": more, "to": person, "options": options}
+    is_same = all(getattr(event, name) == value for name, value in changed.items())
+    return [] if is_same else [replace(event, **changed)]  # type: ignore[arg-type]  # of several types
 
 
 def _fold(text: str) -> str:

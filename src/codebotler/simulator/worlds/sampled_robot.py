@@ -51,10 +51,8 @@ class SampledRobot(SimulatedRobot):
 
     If the program looks for a person or thing, their presence is random. Otherwise, the program's assumptions
     hold: a person answers, and a thing can be picked up. Answers are random options.
-
     A program that searches several rooms assumes that the thing is in one of them. If the thing is in none,
     `excuses` holds the resulting errors, which are not the program's fault.
-
     What the robot last saw before the program began (`RoomMap.past`) is still true.
     """
 
@@ -280,10 +278,7 @@ class SampledRobot(SimulatedRobot):
         return [] if means_anybody(entity) or meant_by(entity, known, plain=True) else fitting
 
     def things(self, where: str = "", is_: str = "") -> list[str]:
-        """Return the things in the room `where` that fit `is_`, such as `red`; by default, all everywhere.
-
-        Whether a thing is in a room is chosen at random when the program first looks for it.
-        """
+        """Return the things in the room `where` (default: anywhere) that fit `is_`, at random."""
         return self._all_of(self.room_map.things, where, is_ or "thing", is_person=False)
 
     def people(self, where: str = "", is_: str = "", **traits: object) -> list[str]:
@@ -357,11 +352,9 @@ class SampledRobot(SimulatedRobot):
         texts = [option.text for option in options]
         if self.answers.get(asked) not in texts:
             self.answers[asked] = self.answer(texts, *asked)
-            names = self.room, question, self.answers[asked]
-            self.facts.append(SampledFact(ANSWER_FORM, names))
-        chosen = texts.index(self.answers[asked])
-        self.amend(texts[chosen])
-        return chosen
+            self.facts.append(SampledFact(ANSWER_FORM, (self.room, question, self.answers[asked])))
+        self.amend(self.answers[asked])
+        return texts.index(self.answers[asked])
 
     @property
     def may_others_be_here(self) -> bool:  # noqa: D102 - inherited
