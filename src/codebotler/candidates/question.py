@@ -107,8 +107,7 @@ class ClarifyingQuestion:
     @property
     def legend(self) -> str:
         """A line above the options: "The programs differ as marked, supposing that Anne is in the lab:"."""
-        marked = " as marked" * any(one.own for one in self.options)
-        return f"The programs differ{marked}{self.supposition}:"
+        return f"The programs differ{' as marked' * any(one.own for one in self.options)}{self.supposition}:"
 
     @property
     def supposition(self) -> str:
@@ -137,8 +136,7 @@ class ClarifyingQuestion:
         if (option := self.chosen(answer)) is None:
             return self.rejections
         who = "a person left the choice to CodeBotler" if answer == "decide" else "a person chose"
-        others = (one for one in self.options if one is not option)
-        rest = [f"another option was a robot that {one.course}" for one in others]
+        rest = [f"another option was a robot that {one.course}" for one in self.options if one is not option]
         return [f"{who}{self.supposition}: a robot that {option.course}", *rest]
 
     def parse(self, line: str) -> ClarifyingAnswer:

@@ -73,7 +73,10 @@ def parse(source: str) -> ast.Module:
     """Parse a program. Raise the same errors as `ast.parse`. Do not modify the tree: callers share it."""
     _expect_short_rows(source)
     with _PARSING:
-        return ast.parse(compose(source), SOURCE_NAME)
+        try:
+            return ast.parse(compose(source), SOURCE_NAME)
+        except SystemError:  # a library has parsed something in another thread
+            return ast.parse(compose(source), SOURCE_NAME)
 
 
 @lru_cache(maxsize=8)

@@ -254,3 +254,16 @@ def test_a_process_forked_while_a_thread_parses_can_parse() -> None:
         os._exit(len(program.parse("1").body) - 1)
     assert os.waitpid(child, 0)[1] == 0
     parsing.join()
+
+
+def test_a_program_is_parsed_again_if_a_library_has_disturbed_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    disturbed = [SystemError("AST constructor recursion depth mismatch")]
+    parse = program.ast.parse
+
+    def parse_once_disturbed(*arguments: str) -> object:
+        if disturbed:
+            raise disturbed.pop()
+        return parse(*arguments)
+
+    monkeypatch.setattr(program.ast, "parse", parse_once_disturbed)
+    assert len(program.parse("disturbed = 1").body) == 1
