@@ -1,3 +1,4 @@
+import ast
 import os
 import signal
 import subprocess
@@ -258,12 +259,12 @@ def test_a_process_forked_while_a_thread_parses_can_parse() -> None:
 
 def test_a_program_is_parsed_again_if_a_library_has_disturbed_it(monkeypatch: pytest.MonkeyPatch) -> None:
     disturbed = [SystemError("AST constructor recursion depth mismatch")]
-    parse = program.ast.parse
+    parse = ast.parse
 
-    def parse_once_disturbed(*arguments: str) -> object:
+    def parse_once_disturbed(source: str, name: str) -> ast.Module:
         if disturbed:
             raise disturbed.pop()
-        return parse(*arguments)
+        return parse(source, name)
 
-    monkeypatch.setattr(program.ast, "parse", parse_once_disturbed)
+    monkeypatch.setattr(ast, "parse", parse_once_disturbed)
     assert len(program.parse("disturbed = 1").body) == 1
