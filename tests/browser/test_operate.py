@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, Route, expect
+from playwright.sync_api import Locator, Page, Route, expect
 
 from pageserver import PageServer
 from server import Fault, Server
@@ -191,18 +191,23 @@ def test_only_what_this_browser_shows_is_approved(server: PageServer, open_page:
     expect(page.locator(".cm-content")).not_to_contain_text("something else")
 
 
-def test_a_click_on_a_stalled_connection_approves_only_what_it_was_made_for(
-    server: PageServer, open_page: OpenPage
-) -> None:
-    page = open_page(server)
+def replace_while_stalled(server: PageServer, page: Page) -> Locator:
+    """Replace the program on a page that hears nothing from the server, and return the button to run it."""
     type_and_check(page, TEA)
     button = page.get_by_role("button", name="Run it on the robot")
     expect(button).to_be_enabled()
     page.evaluate(STALL)
     server.call("POST", "/api/missions", {"program": FAR})
     wait_until(page, "fetch('api/missions/current').then(a => a.json()).then(a => a.state === 'checked')")
-    page.wait_for_timeout(2_000)
-    button.click()
+    page.wait_for_timeout(2_500)  # longer than the server refuses clicks
+    return button
+
+
+def test_a_click_on_a_stalled_connection_approves_only_what_it_was_made_for(
+    server: PageServer, open_page: OpenPage
+) -> None:
+    page = open_page(server)
+    replace_while_stalled(server, page).click()
     page.wait_for_timeout(500)
     page.evaluate("release()")
     expect(page.get_by_text("review it again")).to_be_visible()
@@ -214,14 +219,7 @@ def test_a_click_as_a_stalled_connection_recovers_approves_nothing(
     server: PageServer, open_page: OpenPage
 ) -> None:
     page = open_page(server)
-    type_and_check(page, TEA)
-    button = page.get_by_role("button", name="Run it on the robot")
-    expect(button).to_be_enabled()
-    page.evaluate(STALL)
-    server.call("POST", "/api/missions", {"program": FAR})
-    wait_until(page, "fetch('api/missions/current').then(a => a.json()).then(a => a.state === 'checked')")
-    page.wait_for_timeout(2_500)
-    button.evaluate("""async (button) => {
+    replace_while_stalled(server, page).evaluate("""async (button) => {
         release();
         while (!programEditor.text().includes("range(50)")) await new Promise((r) => setTimeout(r, 5));
         button.disabled = false;
