@@ -51,7 +51,7 @@ def get_all_rooms(sim: Simulation) -> list[str]:
     is_idle=True,
 )
 def is_in_room(sim: Simulation, entity: str) -> bool:
-    """Check whether an object or a person is in the robot's room."""
+    """Look whether an object or a person is in the room the robot is in."""
     return sim.look(entity)
 
 
