@@ -235,7 +235,7 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
         asked = Counter(fact.names[:-1] for fact in drawn if fact.form == ANSWER_FORM)
         # The steps of each option show its answer, if options get different answers to the same words.
         kept = [one for one in drawn if one.form != ANSWER_FORM or asked[one.names[:-1]] == 1]
-        # What only some options find out explains best why they differ.
+        # Facts that only some options find out explain best why the options differ.
         kept.sort(key=lambda one: (one.form == ANSWER_FORM, bool(ABSENCE.search(one.sentence))))
         return sorted(kept, key=lambda one: drawn[one] == len(shown))
 

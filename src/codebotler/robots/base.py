@@ -55,7 +55,7 @@ class Robot(Protocol):
 
     @property
     def if_tool_dies(self) -> str:
-        """What happens to the robot if this process is killed, such as `the robot ended as well`."""
+        """The fate of the robot if this process is killed, such as `the robot ended as well`."""
 
     @property
     def rooms_are_regexes(self) -> bool:

@@ -122,7 +122,7 @@ class Console:
 
     @property
     def view(self) -> SessionView:
-        """What viewers see of the current mission, or else of the last one; empty before the first."""
+        """The view of the current mission, or else of the last one; empty before the first."""
         session = self.session
         return SessionView() if session is None else session.view
 

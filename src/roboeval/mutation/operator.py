@@ -16,7 +16,7 @@ from roboeval.mutation.program_tree import Edit, ProgramTree, text_of
 
 @dataclass(frozen=True)
 class Context:
-    """What operators know of a task: its prompts, and the names of rooms, people and things in its worlds."""
+    """The task data for operators: its prompts, and the names of rooms, people and things in its worlds."""
 
     rooms: tuple[str, ...]  # without the rooms where the robot starts
     people: tuple[str, ...]  # owners of rooms, the only people named in instructions

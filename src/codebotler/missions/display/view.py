@@ -148,7 +148,7 @@ class SessionView:
 
     @property
     def phase(self) -> Phase:
-        """What the session is doing, such as `writing`, or else its mission's state, or "" if neither."""
+        """The work of the session, such as `writing`, or else the mission's state; "" if there is neither."""
         if self.is_over or self.is_running:
             return "" if self.state is None else self.state
         if self.is_written:

@@ -37,7 +37,7 @@ DONE_EVENTS = frozenset({"result", "late"})
 
 @dataclass(frozen=True)
 class MissionPast:
-    """What the robot did in an ended mission and its predecessors, so that a new mission can do the rest.
+    """The steps of an ended mission and the missions before it, so that a new mission can do the rest.
 
     Args:
         mission: the ID of the ended mission.

@@ -14,7 +14,7 @@ from codebotler.simulator.worlds.matching import goals_meant
 
 @dataclass(frozen=True)
 class RoomMap:
-    """What is known about a world before random facts are chosen: rooms, names, properties, past events.
+    """The known part of a world before random facts are chosen: rooms, names, properties, past events.
 
     Args:
         rooms: the names of the rooms, in the order in which the robot lists them.
