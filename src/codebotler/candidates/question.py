@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial, reduce
-from operator import and_
+from itertools import chain, groupby
+from operator import and_, itemgetter
 from typing import Any, Literal, TypeAlias
 
 from codebotler.candidates.behaviour import Behaviour, rooms_with_several
@@ -22,11 +23,11 @@ from codebotler.checking.storyboard import steps_of
 from codebotler.core.errors import UserError
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
 from codebotler.core.terminal import shortened
-from codebotler.core.text.phrases import phrase
+from codebotler.core.text.phrases import bracketed, phrase
 from codebotler.core.text.words import brief, counted, elide_list, listed
-from codebotler.core.trace import Event
+from codebotler.core.trace import Event, Outcome, Status
 from codebotler.models.recorded import is_recorded
-from codebotler.simulator.worlds.matching import normalized
+from codebotler.simulator.worlds.matching import SOMEBODY, normalized
 from codebotler.simulator.worlds.sampled_facts import ANSWER_FORM, SampledFact
 
 DOMINANT_SHARE = 0.75
@@ -43,7 +44,7 @@ ClarifyingAnswer: TypeAlias = int | Literal["none", "decide"]
 """The position of an option from 0, `none` to reject them all, or `decide` to leave it to the tool."""
 
 
-BRIEF, COURSE, WHOLE = (4, 70), (20, 200), (1_000, 4_000)
+MAX_REASON, BRIEF, COURSE, WHOLE = 160, (4, 70), (20, 200), (1_000, 4_000)
 """Limits for actions, rooms of an action, and characters; `WHOLE` if brief descriptions are equal."""
 
 
@@ -180,9 +181,10 @@ def question_about(
     options = []
     differences = describe_differences(samples, behaviours)
     for one, sample, (words, own) in zip(shown, samples, differences, strict=True):
-        behaviour, steps = one.behaviours[number], tuple(steps_of(sample.outcome.trace, has_places=True))
+        behaviour, trace = one.behaviours[number], sample.outcome.trace
+        steps = (*steps_of(trace, has_places=True, has_waits=True),)
         size = sum(other.size for other in groups.clusters if other.behaviours[number] == behaviour)
-        course = _words(sample, range(1, len(steps) + 1), {"ending", "room"}, COURSE)
+        course = _words(sample.outcome, range(1, len(steps) + 1), {"ending", "room"}, COURSE)
         share = _share(one, size, groups.total)
         options.append(CandidateOption(one.program, size, steps, words, course, own, share))
     why_last = "this is the second question" if is_second else ""
@@ -271,9 +273,14 @@ def describe_differences(
         for some in keys
     ]
     differ = {name for one in behaviours for name in one.differences(behaviours[0])}
+    acts = any(trace[n - 1].kind != GOTO for some, trace in zip(own, traces, strict=True) for n in some)
+    # Where all questions offer the same, their options tell nothing apart.
+    if len({key[3:] for key in chain(*keys) if key[:1] == (ASK,)}) == 1:
+        traces = [tuple(replace(event, options=()) for event in trace) for trace in traces]
+    runs = [replace(one.outcome, trace=trace) for one, trace in zip(samples, traces, strict=True)]
     words: list[str] = []
     for limits in (BRIEF, WHOLE):
-        words = [_words(one, each, differ, limits) for one, each in zip(samples, own, strict=True)]
+        words = [_words(one, each, differ, limits, is_less=acts) for one, each in zip(runs, own, strict=True)]
         if len({*words}) == len(words):
             break
     return [*zip(words, own, strict=True)]
@@ -288,37 +295,57 @@ def _noticed(event: Event, rooms: Container[str], several: Container[str]) -> tu
     return () if is_hidden else (event.kind, event.place, normalized(event.text), *event.more)
 
 
-def _words(sample: Sample, own: Container[int], differ: Container[str], limits: tuple[int, int]) -> str:
-    """Describe the own steps of a run, or all that it does if it has none, and how and where it ends."""
-    outcome = sample.outcome
-    own_events = [one for number, one in enumerate(outcome.trace, 1) if number in own]
-    others = {_act(one, limits) for number, one in enumerate(outcome.trace, 1) if number not in own}
-    parts, error = _acts([one for one in own_events if one.kind != GOTO], limits, others), outcome.error
+def _words(
+    run: Outcome,
+    own: Container[int],
+    differ: Container[str],
+    limits: tuple[int, int],
+    *,
+    is_less: bool = False,
+) -> str:
+    """Describe the own acts of a run, and how and where it ends.
+
+    If it has no own acts, describe all of them, after `only` if it `is_less` than another option.
+    """
+    numbered = [*enumerate(run.trace, 1)]
+    others = {_act(one, limits) for number, one in numbered if number not in own}
+    acts = [one for number, one in numbered if number in own and one.kind != GOTO]
+    parts, error = _acts(acts, limits, others), run.error
+    if not acts:
+        acts = [one for one in run.trace if one.kind not in {GOTO, CHECK}]
+        idle = "drives and looks" if run.trace else "does nothing"
+        parts = _acts(acts, limits) or [idle]
+        parts[0] = f"{'only ' * (is_less and bool(run.trace))}{parts[0]}"
     if "ending" in differ and error is not None:
-        parts.append(f"does not finish: {brief(error.message)}")
-    if "room" in differ:
-        ends = "ends" if error is None else "is then"
-        drives = [f"{ends} in {one.destination}" for one in outcome.trace if one.destination is not None]
-        parts += drives[-1:] or ["stays where it is"]
-    if parts:
-        return listed(parts)
-    acts = [one for one in outcome.trace if one.kind not in {GOTO, CHECK}]
-    idle = "only drives and looks" if outcome.trace else "does nothing"
-    return f"only {listed(_acts(acts, limits))}" if acts else idle
+        reason = brief(error.message, MAX_REASON)
+        is_limit = run.status is Status.TIMEOUT
+        parts.append(f"does not finish {f'within {reason}' if is_limit else f'({reason})'}")
+    rooms = [one.destination for one in run.trace if one.destination is not None]
+    if "room" in differ and rooms and (not acts or acts[-1].place != rooms[-1]):
+        parts.append(f"{'ends' if error is None else 'is then'} in {rooms[-1]}")
+    return listed(parts)
 
 
-def _acts(events: Iterable[Event], limits: tuple[int, int], others: Container[str] = ()) -> list[str]:
+def _acts(
+    events: Iterable[Event], limits: tuple[int, int], others: Container[tuple[str, ...]] = ()
+) -> list[str]:
     """Describe actions, each with its rooms: `says "Lunch!" in lab and den`, after `also` if in `others`."""
-    rooms: dict[str, Counter[str]] = {}  # of each phrase
+    rooms: dict[tuple[str, ...], Counter[str]] = {}  # of each act
     for one in events:
         rooms.setdefault(_act(one, limits), Counter())[one.place] += 1
-    found = []
-    for words, counts in rooms.items():
+    acts = []
+    for act, counts in rooms.items():
         places = [f"{room} {count} times" if count > 1 else room for room, count in counts.items()]
-        found.append(f"{'also ' * (words in others)}{words} in {listed(elide_list(places, limits[0]))}")
+        where = f"{act[2]} in {listed(elide_list(places, limits[0]))}"
+        acts.append((f"{'also ' * (act in others)}{act[0]}", where, act[1]))
+    together = [(*key, [one[2] for one in same]) for key, same in groupby(acts, key=itemgetter(0, 1))]
+    found = [f"{verb}{listed(elide_list(objects, limits[0]))}{where}" for verb, where, objects in together]
     return elide_list(found, limits[0])
 
 
-def _act(event: Event, limits: tuple[int, int]) -> str:
-    person = f' of "{brief(event.to)}"' if event.to else ""
-    return phrase(event, "third", show=partial(brief, most=limits[1])) + person
+def _act(event: Event, limits: tuple[int, int]) -> tuple[str, str, str]:
+    """Return the verb, the object, and what comes after it: `asks `, `"Tea?"` and ` [yes | no] of "Ann"`."""
+    show = partial(brief, most=limits[1])
+    verb, quote, rest = phrase(replace(event, options=()), "third", show=show).partition('"')
+    person = f' of "{brief(event.to)}"' if event.to and normalized(event.to) != SOMEBODY else ""
+    return verb, f"{quote}{rest}", f"{bracketed(event, show)}{person}"

@@ -19,9 +19,17 @@ MAX_SHOWN_STEPS, FIRST_STEPS, LAST_STEPS = 40, 12, 6
 STEP_MARK = "❱"
 
 
-def steps_of(trace: Trace, *, has_places: bool = False) -> list[dict[str, Any]]:
-    """Convert a trace to JSON data: a dictionary per step, numbered from 1; with rooms if `has_places`."""
-    return [_step_data(number, event, has_places=has_places) for number, event in enumerate(trace, 1)]
+def steps_of(trace: Trace, *, has_places: bool = False, has_waits: bool = False) -> list[dict[str, Any]]:
+    """Convert a trace to JSON data: a dictionary per step, numbered from 1, with rooms if `has_places`.
+
+    If `has_waits`, `waited` is the seconds that the program waited before a step, unless it is 0.
+    """
+    steps = [_step_data(number, event, has_places=has_places) for number, event in enumerate(trace, 1)]
+    times = [0.0, *(event.time for event in trace)]
+    for step, before, now in zip(steps, times, times[1:], strict=False):
+        if has_waits and now > before:
+            step["waited"] = now - before
+    return steps
 
 
 def _step_data(number: int, event: Event, *, has_places: bool) -> dict[str, Any]:
@@ -58,6 +66,8 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
     for is_shown, some in select_steps(steps, needed):
         if is_shown:
             for step in some:
+                if wait := wait_text(step):
+                    table.add_row(Text(), Padding(Text(wait), (0, 0, 0, 4)))
                 indent = 0 if step["kind"] == GOTO else 4
                 number, is_needed = str(step["step"]), step["step"] in needed
                 mark = Text(f"{STEP_MARK} {number}", "bold red") if is_needed else Text(number, "dim")
@@ -87,6 +97,11 @@ def step_text(step: Mapping[str, Any]) -> Text:
     if step["kind"] == GOTO:
         return _drive(step)
     return Text(phrase(event_from_step(step), "past", show=shortened))
+
+
+def wait_text(step: Mapping[str, Any]) -> str:
+    """Describe the wait before a step of `steps_of`, or return an empty string if there was none."""
+    return f"waits for {step['waited']:g} s" if "waited" in step else ""
 
 
 def _drive(step: Mapping[str, Any]) -> Text:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from nicegui import ui
 
 from codebotler.checking.problems import CheckResult, Sample
-from codebotler.checking.storyboard import event_from_step, select_steps, steps_of
+from codebotler.checking.storyboard import event_from_step, select_steps, steps_of, wait_text
 from codebotler.core.skills.kinds import CHECK, GOTO
 from codebotler.core.terminal import shortened
 from codebotler.core.text.phrases import NO_ANSWER, bracketed, is_question, is_spoken, phrase
@@ -171,7 +171,7 @@ def _strip(sample: Sample, check: CheckResult) -> Strip:
     else:
         ending = "Done."
     world = shortened(f"If {sample.world}", _MAX_WORLD_TEXT) if sample.facts else ""
-    steps = steps_of(sample.outcome.trace, has_places=True)
+    steps = steps_of(sample.outcome.trace, has_places=True, has_waits=True)
     repeated = {(event, event.place) for event in sample.repeated}
     for step, event in zip(steps, sample.outcome.trace, strict=True):
         step["is_repeated"] = (event, event.place) in repeated
@@ -190,6 +190,8 @@ def scenes(
             found.append(Scene(_LEFT_OUT, (Action("more", f"{len(some):,} more steps"),)))
             continue
         for step in some:
+            if wait := wait_text(step):
+                found[-1] = replace(found[-1], deeds=(*found[-1].deeds, Action("wait", wait)))
             if step["kind"] == GOTO:
                 to = step["to"]
                 room = shortened(to or step["text"], _MAX_STEP_TEXT)

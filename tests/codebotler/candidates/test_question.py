@@ -203,10 +203,12 @@ def describe(*traces: Trace) -> list[str]:
 def test_sentences_describe_only_differences() -> None:
     greets = drive("hall", "lab"), say("Hello", "lab"), drive("lab", "hall")
     assert describe((*greets, *ONE), greets) == ['says "1 mugs" in hall', 'only says "Hello" in lab']
-    assert describe((drive("hall", "lab"),), ()) == ["ends in lab", "stays where it is"]
-    both = ['says "1 mugs" in hall and ends in lab', "stays where it is"]
-    assert describe((drive("hall", "lab"), *ONE), ()) == both
-    assert [own for _, own in differences_of((drive("hall", "lab"), *ONE), ())] == [{1, 2}, set()]
+    assert describe((drive("hall", "lab"),), ()) == ["drives and looks and ends in lab", "does nothing"]
+    assert describe((*ONE, drive("hall", "lab")), ()) == [
+        'says "1 mugs" in hall and ends in lab',
+        "does nothing",
+    ]
+    assert [own for _, own in differences_of((*ONE, drive("hall", "lab")), ())] == [{1, 2}, set()]
     assert describe(ONE, ()) == ['says "1 mugs" in hall', "does nothing"]
     look = Event("check", "mug", found=False, place="hall")
     assert describe(ONE, (look,)) == ['says "1 mugs" in hall', "only drives and looks"]
@@ -218,7 +220,7 @@ def test_steps_that_all_options_share_are_not_their_own() -> None:
     look = Event("check", "mug", found=True, place="lab")
     (asked, own), (rest, none) = differences_of((look, picks, asks, picks, say("Bye")), (picks, say("Bye")))
     assert (own, none) == (frozenset({3, 4}), frozenset[int]())
-    assert asked == 'asks "Tea?" [yes | no] of "Ann" in lab and also picks up "mug" in lab'
+    assert asked == 'asks "Tea?" of "Ann" in lab and also picks up "mug" in lab'
     assert rest == 'only picks up "mug" in lab and says "Bye" in hall'
 
 
@@ -239,11 +241,40 @@ def test_questions_with_other_options_or_of_other_people_are_own_steps() -> None
         assert [own for _, own in differences_of((ask,), (other,))] == [{1}, {1}]
 
 
+def test_sentence_leaves_out_what_tells_no_option_apart() -> None:
+    yes_or_no = Option("yes"), Option("no")
+    ask = Event("ask", "Tea?", options=yes_or_no, answer="no", to="person", place="lab")
+    there = drive("hall", "lab")
+    assert describe((there, ask, ask), (there, ask)) == ['also asks "Tea?" in lab', 'only asks "Tea?" in lab']
+    named = replace(ask, to="Ann", options=(*yes_or_no, Option("both")))
+    asked, other = describe((ask,), (named,))
+    assert asked == 'asks "Tea?" [yes | no] in lab'
+    assert other == 'asks "Tea?" [yes | no | both] of "Ann" in lab'
+    # Where the robot ends is said unless it has just done something there.
+    back = drive("lab", "hall")
+    assert describe((there, ask), (there, ask, back)) == [
+        'asks "Tea?" in lab',
+        'asks "Tea?" in lab and ends in hall',
+    ]
+
+
 def test_sentence_quotes_each_utterance_and_counts_equal_steps() -> None:
     picks = Event("pick", "mug", place="lab"), Event("place", "mug", place="hall")
     two, none = describe((say("Hi"), say("Bye"), *picks, *picks), ())
-    assert two.startswith('says "Hi" in hall, says "Bye" in hall, picks up "mug" in lab 2 times')
+    assert two.startswith('says "Hi" and "Bye" in hall, picks up "mug" in lab 2 times')
     assert none == "does nothing"
+
+
+def test_equal_acts_in_the_same_rooms_are_told_together() -> None:
+    asks = tuple(Event("ask", f"{what}?", to="Ann", place="lab") for what in ("Tea", "Milk"))
+    both, _ = describe((*asks, say("Tea", "lab"), drive("lab", "hall"), say("Milk")), ())
+    assert both == 'asks "Tea?" and "Milk?" of "Ann" in lab, says "Tea" in lab and says "Milk" in hall'
+
+
+def test_waits_are_shown_before_the_next_step() -> None:
+    late = replace(say("Tea"), time=300.0)
+    first, _ = ask_about(cluster(1, "a", (say("Hi"), late, *ONE)), cluster(1, "b", TWO)).options
+    assert [step.get("waited") for step in first.steps] == [None, 300.0, None]
 
 
 def test_texts_that_differ_late_are_shown_whole() -> None:
@@ -256,7 +287,7 @@ def test_a_rejection_names_all_that_an_option_does() -> None:
     question = ask_about(cluster(1, "a", (*shared, *ONE)), cluster(1, "b", shared))
     assert [one.difference for one in question.options] == ['says "1 mugs" in hall', 'only says "Hi" in lab']
     first, second = question.rejections
-    assert first.endswith('a robot that says "Hi" in lab, says "1 mugs" in hall and ends in hall')
+    assert first.endswith('a robot that says "Hi" in lab and says "1 mugs" in hall')
     assert second.endswith('a robot that says "Hi" in lab and ends in hall')
 
 
@@ -281,9 +312,9 @@ def test_sentence_names_what_is_said_and_where() -> None:
     rooms = ["lab", "den", "attic", "cellar", "study"]
     everywhere = tuple(event for one in rooms for event in (drive("", one), say("Lunch!", one)))
     first, second, silent = describe((say("Lunch!"),), (say("Lunch!"), *everywhere), (drive("hall", "lab"),))
-    assert first == 'says "Lunch!" in hall and stays where it is'
-    assert second == 'says "Lunch!" in hall, lab, den, attic and 2 more and ends in study'
-    assert silent == "ends in lab"
+    assert first == 'says "Lunch!" in hall'
+    assert second == 'says "Lunch!" in hall, lab, den, attic and 2 more'
+    assert silent == "only drives and looks and ends in lab"
     back = drive("study", "lab")
     only, _ = describe(
         (say("Lunch!"), *everywhere[:2]), (say("Lunch!"), *everywhere[:2], *everywhere[8:], back)

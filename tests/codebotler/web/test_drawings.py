@@ -257,6 +257,14 @@ def test_a_question_is_drawn_with_its_options() -> None:
     assert [deed.text for deed in scene.deeds] == ["Tea? [yes | no]", "no"]
 
 
+def test_a_wait_is_drawn_in_the_room_where_the_robot_waits() -> None:
+    program = "def task_program():\n    say('hi')\n    time.sleep(90)\n    go_to('kitchen')\n    say('bye')\n"
+    (strip,) = strips(check(program, rooms=["hall", "kitchen"]))
+    hall, kitchen = ([deed.text for deed in scene.deeds] for scene in strip.scenes)
+    assert hall == ["hi", "waits for 90 s"]
+    assert kitchen == ["bye"]
+
+
 def test_a_long_run_is_shortened_once_even_if_many_steps_are_needed() -> None:
     trace = tuple(Event(kind, "mug", place="hall") for _ in range(250) for kind in ("check", "pick", "place"))
     steps = steps_of(trace)

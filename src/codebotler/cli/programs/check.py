@@ -111,7 +111,7 @@ def _distinct_samples(found: CheckResult) -> list[Sample]:
 def _sample(sample: Sample) -> Iterator[RenderableType]:
     where = f", where {shortened(sample.world, 1_000)}" if sample.world else ""
     yield Text.assemble(("what the robot would do", "bold"), where)
-    steps = steps_of(sample.outcome.trace, has_places=True)
+    steps = steps_of(sample.outcome.trace, has_places=True, has_waits=True)
     yield storyboard(steps, set())
     if sample.outcome.error is not None:
         error = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"

@@ -22,7 +22,7 @@ class CandidatesPane:
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._more: ui.input | None = None  # what should be different, if there is a second question
+        self._more: ui.textarea | None = None  # what should be different, if there is a second question
         self._box = DrawnBox("which", self._draw)
 
     def show(self, view: SessionView) -> None:
@@ -42,7 +42,7 @@ class CandidatesPane:
             PlainText("p", f'{capitalize(question.why_last)}, so "None of these" ends the mission.', "quiet")
         else:
             label = "If none of these: what should be different?"
-            self._more = ui.input(label).props(f"outlined maxlength={_MAX_SENTENCE}")
+            self._more = ui.textarea(label).props(f"outlined autogrow rows=1 maxlength={_MAX_SENTENCE}")
         with ui.element("div").classes("others"):
             Button("None of these", self._reject, "plain")
             Button("You decide (the first one)", lambda: self._answer("decide"), "plain")

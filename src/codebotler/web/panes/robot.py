@@ -30,6 +30,7 @@ _PHASE_HEADLINES: Mapping[Phase, str] = {
     MissionState.CHECKED: "Ready: waiting for your approval",
     MissionState.APPROVED: "Starting",
 }
+CONTINUE_HINT = "The model writes the rest, and the robot waits until you approve it."
 _MAX_LISTED_MOMENTS, _MAX_TITLE = 60, 160
 
 
@@ -53,6 +54,7 @@ class RobotPane:
             self._reason = PlainText("p", "", "reason")
             self._warning = PlainText("p", "", "lost").props("role=alert")
             self._continue = ContinueButton(console, model=model)
+            self._hint = PlainText("p", "", "quiet")
             self._map = ui.html("", sanitize=False).classes("map")
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
 
@@ -73,6 +75,7 @@ class RobotPane:
         lost = "" if view.is_over and view.progress.has_begun else self._console.warning  # else its reason
         self._warning.show_text(lost)
         self._continue.show(view)
+        self._hint.show_text(CONTINUE_HINT if self._continue.visible else "")
         if self._asking is not None:
             self._asking.show(is_over=view.is_over)
         self._draw_map(view)
