@@ -14,7 +14,7 @@ from codebotler.web.console import Console
 from codebotler.web.frame import Button, DrawnBox, PlainText, scroll_up, warn
 from codebotler.web.storyboard import draw_scene, scenes
 
-_MAX_DIFFERENCE, _MAX_SENTENCE = 400, 500
+_MAX_DIFFERENCE, _MAX_SENTENCE, _MAX_NEEDED_STEPS = 400, 500, 6
 
 
 class CandidatesPane:
@@ -52,7 +52,8 @@ class CandidatesPane:
         PlainText("small", option.share, "quiet")
         if option.steps:
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
-                for scene in scenes(option.steps, option.steps[0]["place"], option.own):
+                needed = sorted(option.own)[:_MAX_NEEDED_STEPS]
+                for scene in scenes(option.steps, option.steps[0]["place"], needed):
                     draw_scene(scene, option.own)
         else:
             PlainText("p", "The robot does nothing.")
