@@ -211,8 +211,6 @@ def with_contract_problems(found: CheckResult, allowed: Contract, skills: SkillT
     if found.contract is None:
         return found
     new = [" ".join(filter(None, row)) for row in contract_rows(found.contract.excess_over(allowed), skills)]
-    problems = (
-        Problem("OutsideContract", f"the program may {what}, which the contract does not allow")
-        for what in new
-    )
+    messages = [f"the program may {what}, which the contract does not allow" for what in new]
+    problems = (Problem("OutsideContract", message) for message in messages)
     return replace(found, problems=(*found.problems, *problems))

@@ -81,10 +81,8 @@ def find_evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTabl
         and (row.recording is None or row.recording.kind not in named)
     ]
     if rules and unseen:
-        yield (
-            f"rules do not see what the skill {listed(unseen)} makes the robot do; "
-            "name the skill in each rule that should limit it"
-        )
+        act = f"what the skill {listed(unseen)} makes the robot do"
+        yield f"rules do not see {act}; name the skill in each rule that should limit it"
 
 
 def _expect_all_names(rule: Rule, room: str, rooms: Sequence[str]) -> None:
@@ -92,9 +90,8 @@ def _expect_all_names(rule: Rule, room: str, rooms: Sequence[str]) -> None:
     for pattern in room_patterns(rule):
         text = Regex(pattern)
         words = [*samples(room), *samples(pattern)]
-        requests = [
-            one for one in (*words, *(f"x {one} x" for one in words)) if meant_by(one, rooms) == [room]
-        ]
+        asked = (*words, *(f"x {one} x" for one in words))
+        requests = [one for one in asked if meant_by(one, rooms) == [room]]
         missed = [one for one in requests if not text.matches(name_of(room, one))]
         if missed and (len(missed) < len(requests) or text.matches(room)):
             raise UserError(
