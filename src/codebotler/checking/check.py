@@ -127,11 +127,7 @@ def check_together(
 
 
 def room_map_for(
-    program: str,
-    rooms: Sequence[str] | None = None,
-    start: str | None = None,
-    *,
-    skills: SkillTable = SKILLS,
+    program: str, rooms: Sequence[str] | None = None, start: str | None = None, *, skills: SkillTable = SKILLS
 ) -> RoomMap:
     """Return a map of the given rooms and start, or guess them from the program's source.
 
@@ -198,11 +194,7 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
     contract = derive_contract(explored, written, found.room_map, settings.skills)
     problems.sort(key=lambda problem: problem.line or 0)
     return replace(
-        found,
-        problems=tuple(problems),
-        samples=tuple(samples),
-        proofs=tuple(proofs),
-        contract=contract,
+        found, problems=tuple(problems), samples=tuple(samples), proofs=tuple(proofs), contract=contract
     )
 
 

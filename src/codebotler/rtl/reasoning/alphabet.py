@@ -40,9 +40,7 @@ def elements(formula: Formula) -> Iterator[EventPattern]:
 
 
 def alphabet(
-    wanted: Iterable[EventPattern],
-    rooms: Sequence[str] | None = None,
-    moves: Sequence[str] | None = None,
+    wanted: Iterable[EventPattern], rooms: Sequence[str] | None = None, moves: Sequence[str] | None = None
 ) -> list[Event]:
     """Return example events: one for each set of the `wanted` patterns that an event can match together.
 

@@ -162,10 +162,7 @@ class ProgramRun:
             (each[1] if each[2] else EXACT_TYPES.get(each[1], each[1]), each) for each in parameters
         ]
         self.kinds[name] = [kind for _, kind, _, _ in parameters]
-        scope = {
-            "perform": lambda *values: self.perform(name, types_, values),
-            "limit": setrecursionlimit,
-        }
+        scope = {"perform": lambda *values: self.perform(name, types_, values), "limit": setrecursionlimit}
         exec(  # noqa: S102 - made from trusted text
             f"def {name}({names}):\n"
             f"    limit({self.recursion_limit + HEADROOM})\n"
