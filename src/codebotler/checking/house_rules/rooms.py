@@ -27,10 +27,8 @@ def unknown_rooms_in(rule: Rule, rooms: Sequence[str]) -> Iterator[str]:
     poses = {pattern for one in rule.inside for pattern in patterns(one.text)}
     for pattern in dict.fromkeys(room_patterns(rule)):
         if not may_mean(pattern, rooms) or (pattern in poses and not any(map(Regex(pattern).matches, rooms))):
-            yield (
-                f'the rule "{rule.name}" names the room "{pattern}", which does not exist'
-                f'{closest_room(pattern, rooms)}; correct it, or add "any: true"'
-            )
+            missing = f'the room "{pattern}", which does not exist{closest_room(pattern, rooms)}'
+            yield f'the rule "{rule.name}" names {missing}; correct it, or add "any: true"'
 
 
 def room_patterns(rule: Rule) -> Iterator[str]:
@@ -94,7 +92,6 @@ def _expect_all_names(rule: Rule, room: str, rooms: Sequence[str]) -> None:
         requests = [one for one in asked if meant_by(one, rooms) == [room]]
         missed = [one for one in requests if not text.matches(name_of(room, one))]
         if missed and (len(missed) < len(requests) or text.matches(room)):
-            raise UserError(
-                f'the rule "{rule.name}" does not cover "{missed[0]}", another name of the room "{room}"; '
-                "use a pattern for all names of the room"
-            )
+            other = f'"{missed[0]}", another name of the room "{room}"'
+            fix = "use a pattern for all names of the room"
+            raise UserError(f'the rule "{rule.name}" does not cover {other}; {fix}')

@@ -200,10 +200,8 @@ def _is_of_other(completion: Completion, suite: Suite) -> str | None:
         return None
     if completion.instruction == suite.tasks[completion.task].prompts[completion.prompt]:
         return None
-    return (
-        f'{name_of(completion.key)} has a different instruction than "{suite.name}"; '
-        "see run.json for the right suite and version"
-    )
+    differs = f'{name_of(completion.key)} has a different instruction than "{suite.name}"'
+    return f"{differs}; see run.json for the right suite and version"
 
 
 def _expect_new(key: CompletionKey, seen: dict[CompletionKey, int], number: int) -> None:
