@@ -127,11 +127,7 @@ def check_together(
 
 
 def room_map_for(
-    program: str,
-    rooms: Sequence[str] | None = None,
-    start: str | None = None,
-    *,
-    skills: SkillTable = SKILLS,
+    program: str, rooms: Sequence[str] | None = None, start: str | None = None, *, skills: SkillTable = SKILLS
 ) -> RoomMap:
     """Return a map of the given rooms and start, or guess them from the program's source.
 
@@ -198,11 +194,7 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
     contract = derive_contract(explored, written, found.room_map, settings.skills)
     problems.sort(key=lambda problem: problem.line or 0)
     return replace(
-        found,
-        problems=tuple(problems),
-        samples=tuple(samples),
-        proofs=tuple(proofs),
-        contract=contract,
+        found, problems=tuple(problems), samples=tuple(samples), proofs=tuple(proofs), contract=contract
     )
 
 
@@ -211,8 +203,6 @@ def with_contract_problems(found: CheckResult, allowed: Contract, skills: SkillT
     if found.contract is None:
         return found
     new = [" ".join(filter(None, row)) for row in contract_rows(found.contract.excess_over(allowed), skills)]
-    problems = (
-        Problem("OutsideContract", f"the program may {what}, which the contract does not allow")
-        for what in new
-    )
+    messages = [f"the program may {what}, which the contract does not allow" for what in new]
+    problems = (Problem("OutsideContract", message) for message in messages)
     return replace(found, problems=(*found.problems, *problems))

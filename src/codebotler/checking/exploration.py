@@ -151,9 +151,8 @@ class _Tree:
         known = {run: outcome for (_, run), outcome in self._worker.run_tame([runs.job]).items()}
         self._runs_left -= len(some)
         self._lone_runs_left -= len(some) - len(known)
-        for number, (forced, sample) in enumerate(
-            zip(some, runs.samples_on(self._worker, known), strict=True)
-        ):
+        samples = runs.samples_on(self._worker, known)
+        for number, (forced, sample) in enumerate(zip(some, samples, strict=True)):
             robot = runs.robots[number]
             assert isinstance(robot.guard, ExploringGuard), "made for these runs"
             self.has_assumed |= robot.has_assumed

@@ -137,9 +137,8 @@ class CheckResult:
     contract: Contract | None = None
 
     def __repr__(self) -> str:
-        return (
-            f"CheckResult({counted(len(self.problems), 'problem')}, {counted(len(self.samples), 'sample')})"
-        )
+        problems, samples = counted(len(self.problems), "problem"), counted(len(self.samples), "sample")
+        return f"CheckResult({problems}, {samples})"
 
     @property
     def rooms(self) -> tuple[str, ...]:
@@ -167,9 +166,8 @@ class CheckResult:
     @property
     def evidence(self) -> frozenset[int]:
         """The numbers of the samples that show the problems: for each problem, the first sample with it."""
-        ends = {
-            sample.outcome.line: sample.number for sample in reversed(self.samples) if sample.outcome.error
-        }
+        failed = [sample for sample in reversed(self.samples) if sample.outcome.error]
+        ends = {sample.outcome.line: sample.number for sample in failed}
         first = (
             problem.samples[0] if problem.samples else ends.get(problem.line) for problem in self.problems
         )

@@ -69,12 +69,8 @@ def with_repetition_problems(
     held = held_after(past)
     finished = [one for one in found.samples if one.outcome.status is Status.FINISHED]
     puts_down = "place" in called_skills(parse_leniently(begun))
-    if (
-        held
-        and puts_down
-        and finished
-        and not any(event.kind == PLACE for one in finished for event in one.outcome.trace)
-    ):
+    has_placed = any(event.kind == PLACE for one in finished for event in one.outcome.trace)
+    if held and puts_down and finished and not has_placed:
         message = f'at the end, the robot still holds "{brief(held)}", which the first program puts down'
         problems.append(Problem("KeepsThing", message, samples=tuple(one.number for one in finished)))
     return replace(found, problems=tuple(problems), samples=tuple(samples))
@@ -137,9 +133,8 @@ def has_same_effect(one: Event, other: Event, room_map: RoomMap) -> bool:
     """Whether two steps say, ask or do the same in the same room. False for looks, drives and pick-ups."""
     if one.kind != other.kind or one.kind == PICK or not _has_effect(one.kind):
         return False
-    if _room(one, room_map) != _room(other, room_map) or normalized(one.to or "") != normalized(
-        other.to or ""
-    ):
+    is_in_same_room = _room(one, room_map) == _room(other, room_map)
+    if not is_in_same_room or normalized(one.to or "") != normalized(other.to or ""):
         return False
     is_equal = _words(one.text) == _words(other.text) and one.more == other.more
     return is_equal or (is_spoken(one.kind) and _says_same(one.text, other.text))

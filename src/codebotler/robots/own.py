@@ -68,9 +68,8 @@ class OwnRobot:
         self._methods = {skill: method for skill, method in methods.items() if method is not None}
         for skill, method in self._methods.items():
             _expect_fit(kind, method, self.skills[skill])
-        self.missing: Mapping[str, str] = {
-            skill: f"{kind} has no method {skill}" for skill in self.skills if skill not in self._methods
-        }
+        lacking = [skill for skill in self.skills if skill not in self._methods]
+        self.missing: Mapping[str, str] = {skill: f"{kind} has no method {skill}" for skill in lacking}
         self._stopped = True
         self._is_busy = False
         self._stop_lock, self._stop_returned = threading.Lock(), threading.Event()
@@ -246,9 +245,8 @@ def _run(loop: asyncio.AbstractEventLoop) -> None:
 def _make_body(path: Path, kind: str) -> Any:  # noqa: ANN401 - of a user's class
     """Create an object of a class in a file, or raise UserError if it cannot serve as a robot."""
     module = load_skill_module(path)
-    classes = [
-        n for n, one in vars(module).items() if inspect.isclass(one) and one.__module__ == module.__name__
-    ]
+    members = vars(module).items()
+    classes = [n for n, one in members if inspect.isclass(one) and one.__module__ == module.__name__]
     if kind not in classes:
         hint = f"; its classes are {listed(classes)}" if classes else "; add it"
         raise UserError(f"the file has no class {kind}{hint}", file=path)

@@ -235,9 +235,8 @@ class _Parser(FormulaSource):
             if wanted.choices and not any(text.matches(as_text(one)) for one in wanted.choices):
                 raise self.error(node, f"the text is not one of {', '.join(map(as_text, wanted.choices))}")
             return text
-        if wanted.base == "bool" and not (
-            isinstance(node, ast.Constant) and isinstance(node.value, bool | str)
-        ):
+        is_constant = isinstance(node, ast.Constant) and isinstance(node.value, bool | str)
+        if wanted.base == "bool" and not is_constant:
             raise self.expected("True or False", node)
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.isalpha():
             raise self.expected(f"{wanted.in_words}, or a regex for it", node)
@@ -282,10 +281,8 @@ class _Parser(FormulaSource):
             case ast.Call(ast.Name(name)) if name.endswith("number"):
                 arguments = self.arguments(node, node, name)
                 if len(arguments) < 2:  # noqa: PLR2004 - the number and the thing
-                    raise self.error(
-                        node,
-                        f'{name} takes a number and the thing to count, as in {name}(2, "mug")',
-                    )
+                    usage = f'a number and the thing to count, as in {name}(2, "mug")'
+                    raise self.error(node, f"{name} takes {usage}")
                 number, (thing, *others) = self.number(arguments[0]), map(self.word, arguments[1:])
                 return Number(number, thing, tuple(others), name == "othernumber")
             case ast.Call(ast.Name(name)) if name.endswith("time"):

@@ -130,11 +130,7 @@ class WorkerPool:
     ) -> Iterator[Any]:
         """Yield a function's result for each key, computed in pool threads. `map_batches` has details."""
         return map_batches(
-            lambda some: self.submit(function, some),
-            keys,
-            workers=self.workers,
-            name=name,
-            then=then,
+            lambda some: self.submit(function, some), keys, workers=self.workers, name=name, then=then
         )
 
 

@@ -97,9 +97,8 @@ def _in_other_words(answer: str, options: tuple[Option, ...], settings: Simulati
 
 
 def _first_saying(words: tuple[str, ...], options: tuple[Option, ...], matching: Matching) -> int | None:
-    return next(
-        (number for number, option in enumerate(options) if _says(option.text, words, matching)), None
-    )
+    saying = (number for number, option in enumerate(options) if _says(option.text, words, matching))
+    return next(saying, None)
 
 
 @lru_cache(maxsize=65_536)

@@ -51,9 +51,8 @@ class SkillProtocol:
             final = None
         except ProtocolError as error:
             self.child.end()
-            return self.ledger.outcome(
-                Status.KILLED, "Crash", f"the program wrote to the sandbox channel: {error}"
-            )
+            message = f"the program wrote to the sandbox channel: {error}"
+            return self.ledger.outcome(Status.KILLED, "Crash", message)
         except BaseException:
             with suppress(LostProcessError):  # it would hide the first error
                 self.child.end()
@@ -125,10 +124,9 @@ def describe_skills(robot: SkillPerformer) -> SkillDescriptions:
 
 def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:
     """Convert a call's arguments for the robot. Raise ProtocolError if they do not fit the skill."""
-    if len(values) != len(skill.parameters):
-        raise ProtocolError(
-            f"{skill.name} got {len(values)} arguments, but has {len(skill.parameters)} parameters"
-        )
+    given, expected = len(values), len(skill.parameters)
+    if given != expected:
+        raise ProtocolError(f"{skill.name} got {given} arguments, but has {expected} parameters")
     arguments: list[Argument] = []
     for parameter, value in zip(skill.parameters, values, strict=True):
         if parameter.is_options and isinstance(value, list):

@@ -44,9 +44,8 @@ def parse_selection(text: str, suite: Suite) -> Selection:
     """Parse TASK, TASK/PROMPT or TASK/PROMPT/INDEX, such as `LunchTime/0/12`. Raise UserError otherwise."""
     name, *numbers = text.removesuffix("/").split("/")
     if len(numbers) > 2 or not all(n.isascii() and n.isdecimal() and len(n) < 10 for n in numbers):  # noqa: PLR2004 - parts
-        raise UserError(
-            f'"{visible(text)}" is not a valid selection; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX'
-        )
+        forms = "TASK, TASK/PROMPT or TASK/PROMPT/INDEX"
+        raise UserError(f'"{visible(text)}" is not a valid selection; write {forms}')
     known = next((task for task in suite.tasks if task.lower() == name.lower()), name)
     return (suite.task(known).name, *map(int, numbers))
 

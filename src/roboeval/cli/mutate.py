@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 def mutate(
     tasks: Annotated[
-        list[str] | None,
-        typer.Argument(help="Tasks of the suite; all by default.", metavar="TASK..."),
+        list[str] | None, typer.Argument(help="Tasks of the suite; all by default.", metavar="TASK...")
     ] = None,
     suite: SuiteOption = "paper",
     also: Annotated[
@@ -38,9 +37,7 @@ def mutate(
     most: Annotated[
         int,
         typer.Option(
-            "--mutants",
-            min=1,
-            help="Maximum number of mutants per task, sampled evenly from all operators.",
+            "--mutants", min=1, help="Maximum number of mutants per task, sampled evenly from all operators."
         ),
     ] = 400,
     out: Annotated[

@@ -25,13 +25,9 @@ SourceArgument = Annotated[
 ]
 RunArgument = Annotated[Path, typer.Argument(help="A run folder.", parser=path_to("a run"))]
 SuiteOption = Annotated[
-    str,
-    typer.Option(help="The name of a built-in or installed suite, or a suite folder."),
+    str, typer.Option(help="The name of a built-in or installed suite, or a suite folder.")
 ]
-TasksOption = Annotated[
-    str | None,
-    typer.Option(help="Only these tasks, separated by commas."),
-]
+TasksOption = Annotated[str | None, typer.Option(help="Only these tasks, separated by commas.")]
 AblationOption = Annotated[bool, typer.Option("--ablation", help="Judge only the common-sense requirements.")]
 HouseRulesOption = Annotated[
     Path | None,
@@ -52,8 +48,7 @@ IsolationOption = Annotated[
     bool, typer.Option("--require-isolation", help="Refuse to run programs without full isolation.")
 ]
 ProcessOption = Annotated[
-    bool,
-    typer.Option("--one-process-per-run", help="Give every run its own process, which is slower."),
+    bool, typer.Option("--one-process-per-run", help="Give every run its own process, which is slower.")
 ]
 WorldsOption = Annotated[
     int | None,

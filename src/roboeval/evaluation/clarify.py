@@ -124,9 +124,8 @@ def _by_prompt(completions: Iterable[Completion], least: int) -> dict[tuple[str,
         found.setdefault((one.task, one.prompt), []).append(one)
     if not (enough := {key: some for key, some in sorted(found.items()) if len(some) >= least}):
         most = max(map(len, found.values()), default=0)
-        raise UserError(
-            f"each question needs {least} completions, but no prompt has more than {most}; lower --candidates"
-        )
+        needed = f"each question needs {least} completions"
+        raise UserError(f"{needed}, but no prompt has more than {most}; lower --candidates")
     return enough
 
 

@@ -112,9 +112,8 @@ def expect_same_judge(run: RunFolder, suite: Suite, *, ablated: bool) -> dict[st
     path, rows = run.manifest(key), run.rows(key)
     if not path.exists():
         if rows.exists() and rows.stat().st_size:
-            raise UserError(
-                "this file, which describes the evaluation, is missing; use --redo to judge again", file=path
-            )
+            sentence = "this file, which describes the evaluation, is missing; use --redo to judge again"
+            raise UserError(sentence, file=path)
         return None
     was = load_json_object(path)
     for name, now in evaluation_metadata(suite, ablated=ablated, tasks=None).items():

@@ -54,8 +54,7 @@ class CheckFile(StrictForm):
     commonsense: bool = False  # whether the check tests something that no prompt mentions
     rtl: YamlText  # the formula in RTL
     means: Annotated[
-        dict[str, Name],
-        BeforeValidator(lambda means: {"say": means} if isinstance(means, str) else means),
+        dict[str, Name], BeforeValidator(lambda means: {"say": means} if isinstance(means, str) else means)
     ] = {}
 
 

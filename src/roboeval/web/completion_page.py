@@ -68,9 +68,8 @@ def _worlds(run: Snapshot, task: str) -> dict[str, World]:
 def _draw_head(run: Snapshot, data: Mapping[str, Any], chosen: CompletionFilter, query: str) -> None:
     key: CompletionKey = data["task"], data["prompt"], data["index"]
     with ui.element("nav").classes("trail").props('aria-label="Breadcrumb"'):
-        html.a(
-            shortened(run.name, MAX_NAME), href=outside(f"{run_address(run.name)}{query}#completions")
-        ).props("dir=auto")
+        address = outside(f"{run_address(run.name)}{query}#completions")
+        html.a(shortened(run.name, MAX_NAME), href=address).props("dir=auto")
         for text, other in zip(NEIGHBOUR_LINKS, run.neighbours(key, chosen), strict=True):
             if other is not None:
                 task, prompt, index = other

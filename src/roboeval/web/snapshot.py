@@ -147,9 +147,7 @@ class Snapshot:
         """
         judged = pl.col("judged")
         counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
-            written=pl.len(),
-            judged=pl.col("passed").count(),
-            counted=chosen.without_prompt.condition.sum(),
+            written=pl.len(), judged=pl.col("passed").count(), counted=chosen.without_prompt.condition.sum()
         )
         return counts.with_columns(share=pl.col("counted") / pl.when(judged > 0).then(judged)).to_dicts()
 

@@ -44,9 +44,8 @@ def read_contract(path: Path, skills: SkillTable = SKILLS) -> Contract:
 
 def contract_from(data: Mapping[str, Any], skills: SkillTable) -> Contract:
     """Make a contract from the value of `skills` in a contract file. Raise UserError if it is not valid."""
-    return _contract_in(
-        YamlFile(json.dumps({"version": 1, "skills": data}, ensure_ascii=False), "the contract"), skills
-    )
+    text = json.dumps({"version": 1, "skills": data}, ensure_ascii=False)
+    return _contract_in(YamlFile(text, "the contract"), skills)
 
 
 def _contract_in(file: YamlFile, skills: SkillTable) -> Contract:
@@ -54,9 +53,8 @@ def _contract_in(file: YamlFile, skills: SkillTable) -> Contract:
     bounds = {}
     for name, given in content.skills.items():
         if name not in skills:
-            raise file.wrong(
-                f'there is no skill "{name}"; the skills are: {", ".join(skills)}', "skills", name
-            )
+            sentence = f'there is no skill "{name}"; the skills are: {", ".join(skills)}'
+            raise file.wrong(sentence, "skills", name)
         bounds[name] = _read_bound(file, skills[name], given)
     return Contract(bounds)
 

@@ -68,12 +68,9 @@ def _bound(
         met = sorted({text for call in calls for text in call.texts[number]})
         met = [text for text in met if not any(one.matches(text) for one in allowed)]
         texts.append((parameter.name, _limited((*allowed, *(TextTemplate((text,)) for text in met)))))
-    places = {call.place for call in calls} if has_place(row) and knows_all else None
-    return SkillBound(
-        tuple(texts),
-        tuple(sorted(places)) if places else None,
-        found.most_calls.get(row.name) if knows_all else None,
-    )
+    places = sorted({call.place for call in calls}) if has_place(row) and knows_all else []
+    most_calls = found.most_calls.get(row.name) if knows_all else None
+    return SkillBound(tuple(texts), tuple(places) or None, most_calls)
 
 
 def _limited(templates: Templates) -> Templates:

@@ -27,10 +27,8 @@ def unknown_rooms_in(rule: Rule, rooms: Sequence[str]) -> Iterator[str]:
     poses = {pattern for one in rule.inside for pattern in patterns(one.text)}
     for pattern in dict.fromkeys(room_patterns(rule)):
         if not may_mean(pattern, rooms) or (pattern in poses and not any(map(Regex(pattern).matches, rooms))):
-            yield (
-                f'the rule "{rule.name}" names the room "{pattern}", which does not exist'
-                f'{closest_room(pattern, rooms)}; correct it, or add "any: true"'
-            )
+            missing = f'the room "{pattern}", which does not exist{closest_room(pattern, rooms)}'
+            yield f'the rule "{rule.name}" names {missing}; correct it, or add "any: true"'
 
 
 def room_patterns(rule: Rule) -> Iterator[str]:
@@ -81,10 +79,8 @@ def find_evasions(rules: Sequence[Rule], rooms: Sequence[str], skills: SkillTabl
         and (row.recording is None or row.recording.kind not in named)
     ]
     if rules and unseen:
-        yield (
-            f"rules do not see what the skill {listed(unseen)} makes the robot do; "
-            "name the skill in each rule that should limit it"
-        )
+        act = f"what the skill {listed(unseen)} makes the robot do"
+        yield f"rules do not see {act}; name the skill in each rule that should limit it"
 
 
 def _expect_all_names(rule: Rule, room: str, rooms: Sequence[str]) -> None:
@@ -92,12 +88,10 @@ def _expect_all_names(rule: Rule, room: str, rooms: Sequence[str]) -> None:
     for pattern in room_patterns(rule):
         text = Regex(pattern)
         words = [*samples(room), *samples(pattern)]
-        requests = [
-            one for one in (*words, *(f"x {one} x" for one in words)) if meant_by(one, rooms) == [room]
-        ]
+        asked = (*words, *(f"x {one} x" for one in words))
+        requests = [one for one in asked if meant_by(one, rooms) == [room]]
         missed = [one for one in requests if not text.matches(name_of(room, one))]
         if missed and (len(missed) < len(requests) or text.matches(room)):
-            raise UserError(
-                f'the rule "{rule.name}" does not cover "{missed[0]}", another name of the room "{room}"; '
-                "use a pattern for all names of the room"
-            )
+            other = f'"{missed[0]}", another name of the room "{room}"'
+            fix = "use a pattern for all names of the room"
+            raise UserError(f'the rule "{rule.name}" does not cover {other}; {fix}')

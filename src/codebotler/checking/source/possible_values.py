@@ -110,9 +110,8 @@ class PossibleValues:
             case ast.BinOp(left, ast.Add(), right):
                 return self._is_list(left) or self._is_list(right)
             case ast.Name():
-                return any(
-                    isinstance(value, SEQUENCES) for value in self._values.get(self.variable(node), ())
-                )
+                values = self._values.get(self.variable(node), ())
+                return any(isinstance(value, SEQUENCES) for value in values)
         return isinstance(node, SEQUENCES)
 
     def _bind(self, target: ast.expr, value: PossibleValue) -> None:

@@ -84,9 +84,7 @@ def _read(program: str, parameters: list[tuple[str, list[str]]]) -> tuple[_Found
         given, named = {}, set(TRICKS)
     if named & TRICKS:
         given |= {(skill, name): UNKNOWN for skill, names in parameters for name in names}
-    found = [
-        (skill, name, sorted([*one.parts] for one in templates)) for (skill, name), templates in given.items()
-    ]
+    found = [(*key, sorted([*one.parts] for one in templates)) for key, templates in given.items()]
     return found, bool(named & TRICKS) or _reads_clock(tree)
 
 

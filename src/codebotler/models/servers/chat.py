@@ -266,13 +266,12 @@ def _request_settings(model: Model, settings: SamplingSettings) -> ModelSettings
     """Convert settings for pydantic-ai, leaving out settings that are None."""
     is_openai = isinstance(model, OpenAIChatModel | OpenAIResponsesModel)
     effort = settings.reasoning_effort
+    is_off = effort == "none" and not is_openai
     given: dict[str, Any] = {
         "max_tokens": settings.max_tokens,
         "temperature": settings.temperature,
         "top_p": settings.top_p,
-        "openai_reasoning_effort" if is_openai else "thinking": False
-        if effort == "none" and not is_openai
-        else effort,
+        "openai_reasoning_effort" if is_openai else "thinking": False if is_off else effort,
         "extra_body": None if settings.extra_body is None else dict(settings.extra_body),
         "max_retries": 0,
         "timeout": settings.timeout,

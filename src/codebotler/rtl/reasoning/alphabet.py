@@ -40,9 +40,7 @@ def elements(formula: Formula) -> Iterator[EventPattern]:
 
 
 def alphabet(
-    wanted: Iterable[EventPattern],
-    rooms: Sequence[str] | None = None,
-    moves: Sequence[str] | None = None,
+    wanted: Iterable[EventPattern], rooms: Sequence[str] | None = None, moves: Sequence[str] | None = None
 ) -> list[Event]:
     """Return example events: one for each set of the `wanted` patterns that an event can match together.
 
@@ -101,11 +99,8 @@ def _distinct_events(
     ]
     distinct: dict[tuple[int, str, str], Event] = {}
     for (said, of_said), (heard, of_heard), (there, of_there), (held, of_held) in product(*matched):
-        key = (
-            of_said & of_heard & of_there & of_held,
-            (by_room and there.place) or "",
-            (by_text and said.text) or "",
-        )
+        place, text = (by_room and there.place) or "", (by_text and said.text) or ""
+        key = (of_said & of_heard & of_there & of_held, place, text)
         if key not in distinct:
             distinct[key] = Event(
                 said.kind, said.text, said.options, heard.answer, heard.found, there.place,

@@ -127,9 +127,8 @@ class TranscribedRun(ProgramRun):
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
         """Execute a skill on our copy of the robot, or ask the engine if only it can. Return the result."""
-        given = [
-            _robot_argument(kind, value) for kind, value in zip(self.kinds[name], arguments, strict=True)
-        ]
+        kinds = self.kinds[name]
+        given = [_robot_argument(kind, value) for kind, value in zip(kinds, arguments, strict=True)]
         try:
             if self.now != self.ledger.robot.now:
                 self._let_time_pass()

@@ -149,9 +149,8 @@ class Replay:
             answer = ledger.perform(skill, arguments)
             if ledger.broken is not None:
                 return answer
-            if expected is not None and expected != (
-                answer if answer[0] != "error" else ("error", answer[1][1:])
-            ):
+            answered = answer if answer[0] != "error" else ("error", answer[1][1:])
+            if expected is not None and expected != answered:
                 raise ProtocolError(f"{skill} answered differently in the program's process and the engine")
         if transcript.end is not None:
             self._let_time_pass(transcript.now)

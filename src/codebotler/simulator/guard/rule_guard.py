@@ -39,9 +39,8 @@ def rooms_meant(robot: SimulatedRobot, request: str) -> list[str]:
 
 def goals_of_call(robot: SimulatedRobot, row: Skill, arguments: Sequence[Argument]) -> list[str]:
     """Return the rooms to which a call may drive, under their names in rules; empty if it is not a drive."""
-    goals = (
-        one for parameter, one in zip(row.parameters, arguments, strict=True) if is_goal(row, parameter.name)
-    )
+    given = zip(row.parameters, arguments, strict=True)
+    goals = (one for parameter, one in given if is_goal(row, parameter.name))
     return [room for goal in goals for room in rooms_meant(robot, str(goal))]
 
 

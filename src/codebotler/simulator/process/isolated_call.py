@@ -158,9 +158,8 @@ def serve(module: str, descriptor: str) -> NoReturn:
     import unicodedata as _  # noqa: F401, PLC0415 - needed to parse "\N{...}", and cannot be imported later
 
     reset_inherited_settings()
-    functions = {
-        name: one for name, one in vars(import_module(module)).items() if isinstance(one, IsolatedFunction)
-    }
+    members = vars(import_module(module)).items()
+    functions = {name: one for name, one in members if isinstance(one, IsolatedFunction)}
     for function in functions.values():  # completes their imports
         function.function(*function.rehearsal)
     give_up_rights()

@@ -162,10 +162,7 @@ class ProgramRun:
             (each[1] if each[2] else EXACT_TYPES.get(each[1], each[1]), each) for each in parameters
         ]
         self.kinds[name] = [kind for _, kind, _, _ in parameters]
-        scope = {
-            "perform": lambda *values: self.perform(name, types_, values),
-            "limit": setrecursionlimit,
-        }
+        scope = {"perform": lambda *values: self.perform(name, types_, values), "limit": setrecursionlimit}
         exec(  # noqa: S102 - made from trusted text
             f"def {name}({names}):\n"
             f"    limit({self.recursion_limit + HEADROOM})\n"
@@ -195,10 +192,8 @@ class ProgramRun:
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - a skill may return any type
         """Ask the engine to execute a skill, and return its result."""
-        kinds = self.kinds[name]
-        given = [
-            JSON_WRITERS.get(kind, _value_text)(value) for kind, value in zip(kinds, arguments, strict=True)
-        ]
+        pairs = zip(self.kinds[name], arguments, strict=True)
+        given = [JSON_WRITERS.get(kind, _value_text)(value) for kind, value in pairs]
         return self.request(f"{quoted(name)},[{','.join(given)}]")
 
     def sleep(self, seconds: object, /) -> None:
@@ -259,9 +254,8 @@ def _check_fit(name: str, parameter: ParameterDescription, value: Any, given: ty
         raise TypeError(f"{name}: {named} must be {words}, not {NAME_OF(given)}")
     if choices and value not in choices:
         raise ValueError(f"{name}: {named} must be {words}, not {repr(value)[:100]}")
-    if (given is int and not -MAX_EXACT_INT <= value <= MAX_EXACT_INT) or (
-        given is float and value - value != 0
-    ):
+    is_large = given is int and not -MAX_EXACT_INT <= value <= MAX_EXACT_INT
+    if is_large or (given is float and value - value != 0):
         raise ValueError(f"{name}: {named} must be a number between -2**53 and 2**53")
 
 

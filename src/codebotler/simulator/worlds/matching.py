@@ -186,10 +186,8 @@ def resolve_room(rooms: tuple[str, ...], request: str, matching: Matching) -> st
 
 def means_anybody(request: str, words_for_people: Sequence[str] = WORDS_FOR_PEOPLE) -> bool:
     """Return whether a request consists of words for people only, so that any person is meant."""
-    return all(
-        any(_pattern(whole_words(any_one)).fullmatch(word) for any_one in words_for_people)
-        for word in content_words(request)
-    )
+    patterns = [_pattern(whole_words(regex)) for regex in words_for_people]
+    return all(any(pattern.fullmatch(word) for pattern in patterns) for word in content_words(request))
 
 
 def contains(request: str, name: str) -> bool:

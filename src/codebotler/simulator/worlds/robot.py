@@ -149,18 +149,16 @@ class SimulatedRobot(SimulatedWorld):
         chosen = None if answer is None else choose(answer, question, options, self.settings)
         if chosen is None:
             offered = ", ".join(option.text for option in options)
-            raise RobotError(
-                "AskInvalidOptions", f'none of the options ({offered}) fits the answer to "{question}"'
-            )
+            message = f'none of the options ({offered}) fits the answer to "{question}"'
+            raise RobotError("AskInvalidOptions", message)
         self.amend(options[chosen].text)
         return chosen
 
     def take(self, obj: str) -> None:
         """Pick up the first matching object in this room. Raise RobotError if there is none."""
         if self.held is not None:
-            raise RobotError(
-                "PickWhileHolding", f'the robot holds "{self.held}" and cannot pick up "{obj}" as well'
-            )
+            message = f'the robot holds "{self.held}" and cannot pick up "{obj}" as well'
+            raise RobotError("PickWhileHolding", message)
         thing = self.thing_meant(obj)
         if thing is None:
             raise RobotError(NO_SUCH_THING, f'there is no "{obj}" in "{self.room}"')

@@ -49,8 +49,7 @@ if TYPE_CHECKING:
 def show(
     run: RunArgument,
     what: Annotated[
-        str | None,
-        typer.Argument(help="Show only TASK, TASK/PROMPT or TASK/PROMPT/INDEX."),
+        str | None, typer.Argument(help="Show only TASK, TASK/PROMPT or TASK/PROMPT/INDEX.")
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,

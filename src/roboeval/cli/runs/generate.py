@@ -215,8 +215,7 @@ def run(
         typer.Option("--report/--no-report", help="Write a report to the subfolder `report` of the run."),
     ] = True,
     repair: Annotated[
-        int,
-        typer.Option(min=0, help="Number of rounds in which the model repairs rejected programs."),
+        int, typer.Option(min=0, help="Number of rounds in which the model repairs rejected programs.")
     ] = 0,
     retries: Annotated[
         int, typer.Option(min=0, help="Number of rounds in which rejected programs are regenerated.")

@@ -103,11 +103,8 @@ class AgentConversation(Conversation):
 
 def mission_data(mission: AgentMission) -> dict[str, Any]:
     """Return a mission's `program`, its `ending`, and `tool_errors`, which counts mistakes by kind."""
-    return {
-        "program": mission.program,
-        "ending": mission.ending,
-        "tool_errors": dict(sorted(mission.mistakes.items())),
-    }
+    mistakes = dict(sorted(mission.mistakes.items()))
+    return {"program": mission.program, "ending": mission.ending, "tool_errors": mistakes}
 
 
 def _total_usage(usages: list[Mapping[str, int | None]]) -> dict[str, int | None]:

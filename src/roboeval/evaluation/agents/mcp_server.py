@@ -89,10 +89,8 @@ class MissionDesk:
             return "All missions are done. Say so, and stop."
         key, self._calls = self.todo[0], 0
         self._current = key, self.plan.begin_mission(key)
-        suite = self.plan.suite
-        request = agent_prompt(
-            self.plan.instruction(key), rules=suite.house_sentences, skills=suite.skills, to_end=_TO_END
-        )
+        suite, instruction = self.plan.suite, self.plan.instruction(key)
+        request = agent_prompt(instruction, rules=suite.house_sentences, skills=suite.skills, to_end=_TO_END)
         left = f"({len(self.todo)} missions are left.)"
         return "\n\n".join([*(message.text for message in request.messages), left])
 

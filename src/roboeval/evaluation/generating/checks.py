@@ -42,10 +42,8 @@ def check_programs(
     }
     if suite.house is not None:
         metadata["house_rules"] = suite.house.digest
-    with (
-        run.writing(),
-        contextlib.closing(_open_checks(run, evaluation_key(suite, ablated=False), metadata)) as file,
-    ):
+    evaluation = evaluation_key(suite, ablated=False)
+    with run.writing(), contextlib.closing(_open_checks(run, evaluation, metadata)) as file:
         known = dict(read_checks(file.path))
         programs = {(c.task, c.program_sha256): c.program for c in completions}
         yield from ((key, known[key]) for key in programs if key in known)

@@ -134,12 +134,8 @@ def failure_of_verdicts(verdicts: Sequence[Verdict]) -> Failure | None:
             error = verdict.outcome.error
             if verdict.failed:
                 first = verdict.failed[0]
-                return {
-                    "class": TASK_ERROR_CLASS,
-                    "kind": first.category,
-                    "world": index,
-                    "check": first.text,
-                }
+                kind, check = first.category, first.text
+                return {"class": TASK_ERROR_CLASS, "kind": kind, "world": index, "check": check}
             assert error is not None, "a world with neither an error nor a failed check is satisfied"
             name = _class_of(verdict.outcome.status, error.kind)
             return {"class": name, "kind": error.kind, "world": index, "check": None}

@@ -168,11 +168,9 @@ def run_in_worlds(suite: Suite, worker: Worker, works: Sequence[Work], *, ablate
     planned = [
         (task, program, MissionEnd(int(end[0]), end[1]) if end else None) for task, program, *end in works
     ]
+    scenarios_of = partial(_scenarios, suite, ablated=ablated)
     jobs = [
-        (
-            program,
-            [partial(robot_in, one.world, suite) for one in _scenarios(suite, task, end, ablated=ablated)],
-        )
+        (program, [partial(robot_in, one.world, suite) for one in scenarios_of(task, end)])
         for task, program, end in planned
     ]
     return [

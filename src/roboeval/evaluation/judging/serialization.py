@@ -76,13 +76,8 @@ def judgements_for(verdicts: list[Verdict], prompts: int) -> tuple[bytes, ...]:
 def judgement(verdicts: list[Verdict]) -> bytes:
     """Return `passed`, `failure` and the `verdicts` of all worlds as JSON that fits into a row."""
     why = failure_of_verdicts(verdicts)
-    return limit_size(
-        {
-            "passed": why is None,
-            "failure": why,
-            "verdicts": [verdict_data(verdict) for verdict in verdicts],
-        }
-    )
+    data = [verdict_data(verdict) for verdict in verdicts]
+    return limit_size({"passed": why is None, "failure": why, "verdicts": data})
 
 
 def verdict_data(verdict: Verdict) -> dict[str, Any]:

@@ -63,9 +63,8 @@ class Completion:
     def __post_init__(self) -> None:
         for name, number in (("prompt", self.prompt), ("index", self.index)):
             if type(number) is not int or not 0 <= number < NUMBER_LIMIT:
-                raise UserError(
-                    f"the {name} is {number!r}, but it must be a whole number from 0 to {NUMBER_LIMIT - 1:,}"
-                )
+                allowed = f"a whole number from 0 to {NUMBER_LIMIT - 1:,}"
+                raise UserError(f"the {name} is {number!r}, but it must be {allowed}")
         for name in ("task", "program", "instruction", "model"):
             text = getattr(self, name)
             if not isinstance(text, str) and (text is not None or name in REQUIRED):
@@ -73,9 +72,8 @@ class Completion:
         if "world" in self.more and self.mission is None:
             raise UserError(f'a mission needs a "world" from 0 and an "ending", one of {", ".join(ENDINGS)}')
         if (kind := self.more.get(NO_PROGRAM_COLUMN)) not in (None, *NO_PROGRAM_KINDS):
-            raise UserError(
-                f'"{NO_PROGRAM_COLUMN}" is {kind!r}; use null or one of {", ".join(NO_PROGRAM_KINDS)}'
-            )
+            choices = ", ".join(NO_PROGRAM_KINDS)
+            raise UserError(f'"{NO_PROGRAM_COLUMN}" is {kind!r}; use null or one of {choices}')
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Completion:
@@ -202,10 +200,8 @@ def _is_of_other(completion: Completion, suite: Suite) -> str | None:
         return None
     if completion.instruction == suite.tasks[completion.task].prompts[completion.prompt]:
         return None
-    return (
-        f'{name_of(completion.key)} has a different instruction than "{suite.name}"; '
-        "see run.json for the right suite and version"
-    )
+    differs = f'{name_of(completion.key)} has a different instruction than "{suite.name}"'
+    return f"{differs}; see run.json for the right suite and version"
 
 
 def _expect_new(key: CompletionKey, seen: dict[CompletionKey, int], number: int) -> None:

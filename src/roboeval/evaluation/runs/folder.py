@@ -124,10 +124,8 @@ class RunFolder:
             return
         others = sorted(one.name for one in self.path.iterdir() if not one.name.startswith("."))
         if others:
-            raise UserError(
-                f'this is not a run, but contains other files such as "{others[0]}"; name a new folder',
-                file=self.path,
-            )
+            what = f'contains other files such as "{others[0]}"'
+            raise UserError(f"this is not a run, but {what}; name a new folder", file=self.path)
 
     def import_completions(self, completions: Sequence[Completion]) -> None:
         """Copy completions into this run. Raise UserError, and change nothing, if it has different ones."""

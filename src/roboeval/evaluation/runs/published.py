@@ -58,15 +58,12 @@ def _by_key(files: Iterator[File], path: Path) -> dict[CompletionKey, File]:
         if name.startswith("."):  # macOS adds hidden files to zips
             continue
         if (match := PROGRAM_FILE_NAME.fullmatch(name)) is None:
-            raise UserError(
-                f"the name of a completion must be {NAMED}; rename or remove this file", file=file[0]
-            )
+            fix = "rename or remove this file"
+            raise UserError(f"the name of a completion must be {NAMED}; {fix}", file=file[0])
         key = match["task"], int(match["prompt"]), int(match["index"])
         if key in by_key:
-            raise UserError(
-                f"duplicates {name_of(key)}, already defined in {by_key[key][0]}; remove one of the two",
-                file=file[0],
-            )
+            earlier = f"already defined in {by_key[key][0]}"
+            raise UserError(f"duplicates {name_of(key)}, {earlier}; remove one of the two", file=file[0])
         by_key[key] = file
     if not by_key:
         raise UserError(f"there is no file named {NAMED}; choose another folder or zip", file=path)
@@ -116,9 +113,8 @@ def _assigned(text: str, name: str) -> dict[str, str]:
     try:
         statements = parse(text).body
     except SyntaxError as error:
-        raise UserError(
-            f"this file has a syntax error ({error.msg}); correct it", file=name, line=error.lineno
-        ) from None
+        sentence = f"this file has a syntax error ({error.msg}); correct it"
+        raise UserError(sentence, file=name, line=error.lineno) from None
     except (ValueError, RecursionError, MemoryError):
         raise UserError("this file cannot be parsed as Python; write plain assignments", file=name) from None
     texts = {
@@ -138,6 +134,5 @@ def _text(written: ast.expr, what: str, name: str) -> str:
         case ast.Constant(str(text)):
             # Join surrogate pairs as JSON does.
             return text.encode("utf-16", errors="surrogatepass").decode("utf-16", errors="surrogatepass")
-    raise UserError(
-        f"`{what}` is not a plain string; write a single string literal", file=name, line=written.lineno
-    )
+    fix = "write a single string literal"
+    raise UserError(f"`{what}` is not a plain string; {fix}", file=name, line=written.lineno)

@@ -102,9 +102,8 @@ class JudgingScope:
         if share <= MAX_CUT_OFF_SHARE:
             return None
         at = "the model's own limit" if self.limit is None else f"{self.limit:,} tokens"
-        return (
-            f"{self.cut_off:,} of {self.total:,} replies ({share:.1%}) were cut off at {at}; see --max-tokens"
-        )
+        replies = f"{self.cut_off:,} of {self.total:,} replies ({share:.1%})"
+        return f"{replies} were cut off at {at}; see --max-tokens"
 
     def coverage(self, judged: int, task: str | None = None) -> Coverage:
         """Return the coverage of a task or of all selected tasks, given the number of judged completions."""

@@ -99,9 +99,8 @@ def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequenc
     """Fill in `accepted`: true if a program has no `problems`, by (task, hash), or null if not checked."""
     names = ["task", "program_sha256"]
     answers = [(*key, not found) for key, found in problems.items()]
-    accepted = pl.DataFrame(
-        answers, schema={**dict.fromkeys(names, pl.String), "accepted": pl.Boolean}, orient="row"
-    )
+    schema = {**dict.fromkeys(names, pl.String), "accepted": pl.Boolean}
+    accepted = pl.DataFrame(answers, schema=schema, orient="row")
     joined = table.drop("accepted").join(accepted, on=names, how="left", maintain_order="left")
     return joined.select(table.columns)
 

@@ -95,10 +95,9 @@ class SkillWorker:
         running = self._sign.read_text() if self._sign.exists() else ""
         has_dead_twin = self.connect(start) or bool(running)
         if running and running not in {server.name for server in self.servers.values()}:
-            raise SetupError(
-                f"CodeBotler was killed while {running} had a goal, which this connection cannot cancel; "
-                f"connect with the same options as before, or stop the robot by hand and delete {self._sign}"
-            )
+            why = f"CodeBotler was killed while {running} had a goal, which this connection cannot cancel"
+            mend = "connect with the same options as before, or stop the robot by hand"
+            raise SetupError(f"{why}; {mend} and delete {self._sign}")
         self._listen(start)
         missing = self.missing()
         if self.graph.has_left():

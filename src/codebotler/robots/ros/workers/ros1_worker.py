@@ -148,9 +148,8 @@ class Ros1Worker(SkillWorker):
         self.graph = Ros1Graph(start["node"])
         has_dead_twin = self.graph.enter()
         rospy.on_shutdown(self.stop)
-        self.servers = {
-            skill: ROS1_SERVERS[call["kind"]](self, call) for skill, call in start["calls"].items()
-        }
+        calls = start["calls"].items()
+        self.servers = {skill: ROS1_SERVERS[call["kind"]](self, call) for skill, call in calls}
         return has_dead_twin
 
     def listen(
