@@ -245,7 +245,8 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
     alike = [set(facts(world)) for world in same]
     telling = [fact for fact in facts(number) if not alike or not all(fact in one for one in alike)]
     rooms: dict[str, list[str]] = {}  # of each person or thing that is in several ones
-    for one in telling or facts(number):
+    # The steps of each option show all answers.
+    for one in [one for one in telling if one.form != ANSWER_FORM] or telling or facts(number):
         is_in = one.form.endswith(' in "{}"')
         what, _, room = one.sentence.rpartition(' "') if is_in else (one.sentence, "", "")
         rooms.setdefault(what, []).append(f'"{room}' * is_in)
