@@ -348,6 +348,21 @@ def test_stand_in_for_ros_2_may_end_a_stopped_goal_in_any_way(
         robot.disconnect()
 
 
+def test_stand_in_for_ros_2_may_go_on_after_the_connection_is_lost() -> None:
+    requests: list[dict[str, Any]] = []
+    with bridge(ros2_handler(requests)) as double:
+        robot = robot_at(double.address)
+        robot.connect()
+        with run_in_thread(lambda: robot.perform("go_to", ["never"])) as ended:
+            while not any(one["op"] == "send_action_goal" for one in requests):
+                time.sleep(0.01)
+            double.cut()
+        assert isinstance(ended["error"], RobotLostError)
+        assert "BY HAND" in ended["error"].sentence
+        assert requests[-1]["op"] == "cancel_action_goal", "it tries, but a restarted rosbridge ignores it"
+        robot.disconnect()
+
+
 def test_stand_in_for_ros_2_receives_cancels_after_stops_and_timeouts(
     ros2_robot: RosRobot, requests: list[dict[str, Any]]
 ) -> None:

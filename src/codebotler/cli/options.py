@@ -142,7 +142,10 @@ BehindProxyOption = Annotated[
         metavar="ADDRESS",
     ),
 ]
-TokenOption = Annotated[str | None, typer.Option(help="The access token for the page; a new one by default.")]
+TokenOption = Annotated[
+    str | None,
+    typer.Option(envvar="CODEBOTLER_TOKEN", help="The access token for the page; a new one by default."),
+]
 NoTokenOption = Annotated[
     bool, typer.Option("--no-token", help="Allow access without a token; not with --host or --behind-proxy.")
 ]

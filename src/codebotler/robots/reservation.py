@@ -46,7 +46,7 @@ class Reservation:
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
-            self._lock = os.open(self._path(), os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+            self._lock = os.open(self._path(), os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o600)
             stack.callback(os.close, self._lock)
             self._take()
             stack.callback(self.robot.disconnect)

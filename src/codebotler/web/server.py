@@ -96,17 +96,18 @@ def serve(
             ws_max_size=MAX_BODY_BYTES,
             timeout_graceful_shutdown=_STREAM_END_SECONDS,
         )
-        note(_links(place, port, access, console))
+        address = _address(place, bound)
+        note(_links(place, address, access, console))
         if companion is not None:
-            companion.announce(_address(place, port))
+            companion.announce(address)
         server = _Server(settings, console, companion)
         if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as it is with `nohup`
             signal.signal(signal.SIGHUP, server.handle_exit)
         server.run([bound])
 
 
-def _links(place: PageAddress, port: int, access: Access, console: Console | None) -> str:
-    addresses = [*(proxy.page for proxy in place.proxies), _address(place, port)]
+def _links(place: PageAddress, own: str, access: Access, console: Console | None) -> str:
+    addresses = [*(proxy.page for proxy in place.proxies), own]
 
     def links(page: str, token: str) -> list[str]:
         query = "" if access.operator is None else f"?{urlencode({'token': token})}"
@@ -125,9 +126,11 @@ def _links(place: PageAddress, port: int, access: Access, console: Console | Non
     return "\n".join(lines)
 
 
-def _address(place: PageAddress, port: int) -> str:
-    shown = "localhost" if place.is_loopback else socket.gethostname()
-    return f"http://{shown}:{port}/"
+def _address(place: PageAddress, bound: socket.socket) -> str:
+    """Return the page's own address. It is not `localhost`, where another user may listen by IPv6."""
+    host, port = bound.getsockname()[:2]
+    shown = f"[{host}]" if ":" in host else host
+    return f"http://{shown if place.is_loopback else socket.gethostname()}:{port}/"
 
 
 def _check_prefixes(app: FastAPI, place: PageAddress) -> None:

@@ -99,7 +99,7 @@ def test_all_tools_work_over_http(server: AgentServer, mode: str) -> None:
             assert robot["rooms"] == ["hall", "kitchen", "study"]
             assert (await call(client, "check_program", program=HELLO))["accepted"]
             proposed = await call(client, "propose_mission", instruction="hello", program=HELLO)
-            assert f"http://localhost:{server.port}/" in proposed["next"]
+            assert f"http://127.0.0.1:{server.port}/" in proposed["next"]
             assert server.token not in json.dumps(proposed)
             said: list[str | None] = []
 
@@ -298,7 +298,7 @@ def test_all_tools_work_over_stdio(folder: Path, mode: str) -> None:
             assert (await call(client, "read_robot"))["rooms"] == ["hall", "kitchen", "study"]
             assert (await call(client, "check_program", program=HELLO))["accepted"]
             proposed = await call(client, "propose_mission", instruction="hello", program=HELLO)
-            assert "http://localhost:" in proposed["next"]
+            assert "http://127.0.0.1:" in proposed["next"]
             done = await call(client, "run_mission", digest=proposed["digest"])
             assert (done["state"], len(questions)) == ("done", 1)
             stepwise = await call(

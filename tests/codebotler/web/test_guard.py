@@ -172,8 +172,11 @@ def test_a_token_in_the_address_opens_pages_only(server: PageServer) -> None:
         assert (answer.status, "set-cookie" in answer.headers) == (401, False)
 
 
-def test_tries_with_wrong_tokens_are_limited(tmp_path: Path) -> None:
-    with PageServer(tmp_path, "--token", "one-that-a-person-made") as server:
+def test_tries_with_wrong_tokens_are_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Other users can read the words of a command, but not its variables.
+    monkeypatch.setenv("CODEBOTLER_TOKEN", "one-that-a-person-made")
+    with PageServer(tmp_path) as server:
+        assert server.token == "one-that-a-person-made"
         cookie = server.cookie
         wrong = [server.ask("GET", f"/?token=wrong{n}").status for n in range(MAX_WRONG_TOKENS + 2)]
         assert wrong == [401] * MAX_WRONG_TOKENS + [429] * 2
@@ -181,6 +184,11 @@ def test_tries_with_wrong_tokens_are_limited(tmp_path: Path) -> None:
         forwarded = server.ask("GET", f"/?token={server.token}", x_forwarded_for="10.9.8.7")
         assert (forwarded.status, forwarded.headers["retry-after"]) == (429, "60")
         assert server.ask("GET", "/api/robot", cookie=cookie).status == 200  # A cookie still works.
+
+
+def test_the_link_names_the_address_at_which_the_page_listens(server: PageServer) -> None:
+    """Browsers try `localhost` by IPv6 first, where another user of the machine may listen."""
+    assert server.link.startswith(f"http://127.0.0.1:{server.port}/")
 
 
 def test_wrong_tokens_do_not_keep_a_generated_token_from_a_stop(tmp_path: Path) -> None:

@@ -207,7 +207,10 @@ def serve_page(
     ] = False,
     face_timeout: options.FaceTimeoutOption = 60.0,
     face_token: Annotated[
-        str | None, typer.Option(help="The access token for the face; a new one by default.")
+        str | None,
+        typer.Option(
+            envvar="CODEBOTLER_FACE_TOKEN", help="The access token for the face; a new one by default."
+        ),
     ] = None,
     stop_when_alone: Annotated[
         float | None,

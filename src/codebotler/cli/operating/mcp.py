@@ -22,7 +22,10 @@ AskClientOption = Annotated[
     ),
 ]
 AgentTokenOption = Annotated[
-    str | None, typer.Option(help="The access token for agents with --http; a new one by default.")
+    str | None,
+    typer.Option(
+        envvar="CODEBOTLER_AGENT_TOKEN", help="The access token for agents with --http; a new one by default."
+    ),
 ]
 
 
@@ -53,7 +56,8 @@ def serve_agents(
 
     asks = not http if ask_client is None else ask_client
     if agent_token is not None and not http:
-        raise UserError("--agent-token needs --http; add --http, or leave out --agent-token")
+        given = "--agent-token or CODEBOTLER_AGENT_TOKEN"
+        raise UserError(f"{given} needs --http; add --http, or give no token for agents")
     streams = None if http else server.take_streams()
     console = open_console(model, base_url, shared, candidates=candidates)
     writes = bool(model) or not is_recorded(console.models[0])

@@ -146,12 +146,14 @@ class RosbridgeWorker(SkillWorker):
         """After the connection is lost, cancel the current goal over a new connection."""
         goal = self.goal
         if goal is not None and goal.sent is not None and not goal.is_over:
-            where = self.graph.address
-            cancel = self.graph.protocol.cancel(goal.server.name, goal.handle)
-            if goal.server.kind == "action" and self.graph.insist(cancel):
-                text = f"the connection to {where} was lost; the goal was cancelled over a new connection"
+            lost, protocol = f"the connection to {self.graph.address} was lost", self.graph.protocol
+            cancel = protocol.cancel(goal.server.name, goal.handle)
+            is_sent = goal.server.kind == "action" and self.graph.insist(cancel)
+            # A rosbridge of ROS 2 that was restarted ignores cancels of the goals before.
+            if is_sent and protocol.has_status:
+                text = f"{lost}; the goal was cancelled over a new connection"
             else:
-                text = f"the connection to {where} was lost, but the goal continues: STOP THE ROBOT BY HAND"
+                text = f"{lost}, but the goal may continue: STOP THE ROBOT BY HAND"
             self.end(goal, "lost", text=text)
 
 
