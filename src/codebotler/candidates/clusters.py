@@ -37,7 +37,8 @@ from codebotler.simulator.worlds.matching import SOMEBODY, contains, normalized
 from codebotler.simulator.worlds.room_map import RoomMap
 
 RANDOM_WORLDS, MAX_SHARED_WORLDS = 8, 24  # random worlds, and worlds with those that try further facts
-SETTLED_WORLDS = 16  # added if candidates contradict each other in most of these
+SETTLED_WORLDS = 16  # added if candidates contradict each other in any of these
+MAX_CANDIDATE_OPTIONS = 3
 ROOM_NUMBER = re.compile(r"\s*\d+$")
 
 
@@ -165,8 +166,7 @@ def cluster_candidates(
         raise UserError(f"{again} would do what you rejected before; rephrase the instruction")
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     people = frozenset(map(normalized, rooms.people))
-    conflicts = [*map(bool, conflicts_in_worlds(clusters, people).values())]
-    if sum(conflicts) > len(conflicts) / 2:
+    if any(conflicts_in_worlds(clusters, people).values()):
         more = _run_with_settled_people(worker, clusters, rooms, settings)
         clusters = [one.extended(new, describe(new)) for one, new in zip(clusters, more, strict=True)]
     unwanted_count = len(programs) - len(rejected) - sum(one.size for one in clusters)
@@ -242,15 +242,23 @@ def run_in_shared_worlds(
     return [[replace(sample, number=number) for number, sample in enumerate(samples)] for samples in runs]
 
 
+def distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:
+    """Return up to three clusters with different behaviours in a world, with the largest first."""
+    different: dict[Behaviour, CandidateCluster] = {}
+    for one in clusters:
+        different.setdefault(one.behaviours[number], one)
+    return [*different.values()][:MAX_CANDIDATE_OPTIONS]
+
+
 def conflicts_in_worlds(clusters: Sequence[CandidateCluster], people: Container[str] = ()) -> dict[int, int]:
-    """Return the number of contradictions in each world where the clusters differ, by the world's number.
+    """Return the number of contradictions between the options of each world where the clusters differ.
 
     If chance has put some of `people` (normalized names) into rooms, they count as met there.
     """
     conflicts: dict[int, int] = {}
     for number in range(len(clusters[0].samples)):
         if len({one.behaviours[number] for one in clusters}) > 1:
-            samples = [one.samples[number] for one in clusters]
+            samples = [one.samples[number] for one in distinct_clusters(clusters, number)]
             homes = _drawn_places(samples, people, results=[1])
             conflicts[number] = count_conflicts((one.outcome.trace for one in samples), homes)
     return conflicts

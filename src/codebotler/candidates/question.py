@@ -16,6 +16,7 @@ from codebotler.candidates.clusters import (
     CandidateCluster,
     CandidateClusters,
     conflicts_in_worlds,
+    distinct_clusters,
     main_reason,
 )
 from codebotler.checking.problems import Sample
@@ -33,7 +34,7 @@ from codebotler.simulator.worlds.sampled_facts import ANSWER_FORM, SampledFact
 DOMINANT_SHARE = 0.75
 """The largest cluster is taken without a question if it has at least this share of the candidates."""
 
-MAX_CANDIDATE_OPTIONS, MAX_QUESTION_FACTS = 3, 4
+MAX_QUESTION_FACTS = 4
 NOTICED_FIRST = frozenset({"said", "moved", "asked", "room"})
 """The fields of a `Behaviour` that a person cares about most."""
 
@@ -173,8 +174,8 @@ def question_about(
         return None
     conflicts = conflicts_in_worlds(groups.clusters, groups.people)
     worlds = [number for number, count in conflicts.items() if count == min(conflicts.values())]
-    number = max(worlds, key=lambda one: _rank(_distinct_clusters(groups.clusters, one), one))
-    shown = _distinct_clusters(groups.clusters, number)
+    number = max(worlds, key=lambda one: _rank(distinct_clusters(groups.clusters, one), one))
+    shown = distinct_clusters(groups.clusters, number)
     shown.sort(key=lambda one: bool(one.behaviours[number].ending))  # those that finish come first
     samples = [one.samples[number] for one in shown]
     behaviours = [one.behaviours[number] for one in shown]
@@ -201,14 +202,6 @@ def _share(shown: CandidateCluster, size: int, total: int) -> str:
     waits = f"; waits or ends without success in {shown.in_vain} of {worlds}"
     share = f"{shown.size} of {counted(total, 'program')}"
     return f"{share}{here * (size > shown.size)}{waits * bool(shown.in_vain)}"
-
-
-def _distinct_clusters(clusters: Sequence[CandidateCluster], number: int) -> list[CandidateCluster]:
-    """Return the largest clusters with different behaviours in a world, at most three."""
-    different: dict[Behaviour, CandidateCluster] = {}
-    for one in clusters:
-        different.setdefault(one.behaviours[number], one)
-    return [*different.values()][:MAX_CANDIDATE_OPTIONS]
 
 
 def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, ...]:

@@ -189,6 +189,8 @@ def scenes(
         if not is_shown:
             found.append(Scene(_LEFT_OUT, (Action("more", f"{len(some):,} more steps"),)))
             continue
+        if found[-1].room == _LEFT_OUT and some[0]["kind"] != GOTO:
+            found.append(Scene(shortened(some[0]["place"], _MAX_STEP_TEXT)))
         for step in some:
             if wait := wait_text(step):
                 found[-1] = replace(found[-1], deeds=(*found[-1].deeds, Action("wait", wait)))

@@ -108,6 +108,45 @@ def test_who_is_asked_is_not_there_if_another_program_finds_nobody(worker: Worke
     assert any("does not finish" in option.difference for option in question.options)
 
 
+PARTY = """def task_program():
+    for name in ["ann", "bob", "eve"]:
+        go_to(f"{name}'s office")
+        %s
+    go_to("hall")
+    say(%s)
+"""
+
+
+def test_options_of_a_question_do_not_contradict_each_other(worker: Worker) -> None:
+    """Another candidate that is not shown may do so, since it offers other answers to the same question."""
+    ask = "last = ask(name, 'Do you come?', [%s])"
+    asks = PARTY % (ask % "'yes', 'no', 'maybe'", "f'Eve says {last}.'")
+    report = PARTY % (ask % "'yes', 'no', 'maybe'", "f'It is {last} for 3 people.'")
+    looks = PARTY % (f"last = 'out'\n        if is_in_room(name): {ask % '1, 2'}", "f'Last: {last}.'")
+    first_looks = looks.replace("1, 2", "'yes', 'no', 'maybe'")
+    rooms = RoomMap(("hall", *(f"{name}'s office" for name in ("ann", "bob", "eve"))), "hall")
+    question = question_about(
+        cluster(worker, asks, asks, report, report, first_looks, first_looks, looks, rooms=rooms)
+    )
+    assert question is not None
+    assert not any(" is not in " in fact for fact in question.facts), "people who answer are there"
+
+
+def test_a_failure_is_shown_where_others_find_a_person_elsewhere(worker: Worker) -> None:
+    """This holds even if most worlds contain no contradiction."""
+    here = PARTY.replace('["ann", "bob", "eve"]', '["bob"]') % (
+        "answer = ask(name, 'How many?', ['yes', 'no'])",
+        "f'1 {answer}'",
+    )
+    missing = "        if not is_in_room(name):\n            %s\n            return\n        answer"
+    look = here.replace("        answer", missing.replace("            return\n", "") % "go_to('den')")
+    give_up = here.replace("        answer", missing % "say('Bob is out')").replace("f'1", "f'2")
+    rooms = RoomMap(("hall", "bob's office", "den"), "hall")
+    question = question_about(cluster(worker, here, here, look, look, give_up, give_up, rooms=rooms))
+    assert question is not None
+    assert any("does not finish" in option.difference for option in question.options)
+
+
 def test_a_person_is_in_one_room_in_some_world(worker: Worker) -> None:
     search = "def task_program():\n    for room in get_all_rooms():\n        go_to(room)\n        {}\n"
     warn = search.format("if is_in_room('zoe') or is_in_room('omar'): say('Mind the floor')")
