@@ -22,7 +22,11 @@ if TYPE_CHECKING:  # the Python of a robot on ROS, which forks nodes, may be an 
     from types import TracebackType
     from typing import Self
 
-PAGE = ("codebotler.web.server", "roboeval.web.pages")
+PAGE = (
+    *("codebotler.cli.operating.serving", "codebotler.robots.open", "codebotler.web.server"),
+    *("fastapi.middleware.gzip", "nicegui.middlewares", "nicegui.ui_run_with", "roboeval.web.pages"),
+    *("uvicorn.lifespan.on", "uvicorn.loops.uvloop", "uvicorn.protocols.websockets.auto"),
+)
 """What a page needs besides, and other commands do not."""
 PROGRAMS = (
     *("codebotler.cli.operating.run", "codebotler.cli.programs.check", "codebotler.cli.programs.generate"),
