@@ -106,7 +106,7 @@ with socket.create_server(("127.0.0.1", 0)) as free:
 page = subprocess.Popen([*command, "--port", port], stderr=subprocess.PIPE, text=True)
 try:
     link = next(line.strip() for line in page.stderr if "http://" in line)
-    link = re.sub(r"//[^/]*", "//localhost:" + port, link)
+    link = re.sub(r"//[^/]*", "//127.0.0.1:" + port, link)
     browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
     for again in range(5):  # A busy machine may answer too late.
         try:

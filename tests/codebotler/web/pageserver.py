@@ -126,7 +126,7 @@ class PageServer:
     @property
     def face_link(self) -> str:
         """The link that opens the robot's face, if it has one."""
-        return f"http://localhost:{self.port}/face?token={self.face_token}"
+        return f"http://127.0.0.1:{self.port}/face?token={self.face_token}"
 
     def face(self, method: str, path: str, body: object = None) -> Answer:
         """Send a request with the token of the robot's face."""
@@ -168,4 +168,4 @@ class PageServer:
     @property
     def inside(self) -> str:
         """The address below which a browser stays once it has opened the link."""
-        return f"http://localhost:{self.port}{self.path}"
+        return f"http://127.0.0.1:{self.port}{self.path}"
