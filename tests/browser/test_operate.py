@@ -35,6 +35,13 @@ STALL = """() => {
     window.release = () => { connection.onmessage = receive; held.forEach((each) => receive(each)); };
 }"""
 """Holds back all that the server sends, until `release` is called."""
+STALL_SENDING = """() => {
+    const connection = window.socket.io.engine.transport.ws;
+    const [send, held] = [connection.send.bind(connection), []];
+    connection.send = (message) => held.push(message);
+    window.release = () => { connection.send = send; held.forEach((each) => send(each)); };
+}"""
+"""Holds back all that the page sends over its websocket, until `release` is called."""
 
 
 def write(page: Page, program: str) -> None:
@@ -213,6 +220,28 @@ def test_a_click_on_a_stalled_connection_approves_only_what_it_was_made_for(
     expect(page.get_by_text("review it again")).to_be_visible()
     expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
     expect(page.locator(".cm-content")).to_contain_text("range(50)")
+
+
+@pytest.mark.parametrize("key", ["Escape", "STOP"])
+def test_a_click_on_a_stalled_connection_does_not_outlive_a_stop(
+    server: PageServer, open_page: OpenPage, key: str
+) -> None:
+    page = open_page(server)
+    type_and_check(page, TEA)
+    button = page.get_by_role("button", name="Run it on the robot")
+    expect(button).to_be_enabled()
+    page.evaluate(STALL_SENDING)
+    button.click()
+    page.wait_for_timeout(300)
+    if key == "STOP":
+        page.get_by_role("button", name="STOP").click()
+    else:
+        page.keyboard.press(key)
+    page.wait_for_timeout(500)
+    page.evaluate("release()")
+    expect(page.get_by_text("look at the program again")).to_be_visible()
+    state = server.call("GET", "/api/missions/current").data["state"]
+    assert state == ("stopped" if key == "STOP" else "checked")
 
 
 def test_a_click_as_a_stalled_connection_recovers_approves_nothing(

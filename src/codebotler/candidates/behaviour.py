@@ -106,11 +106,6 @@ def statements(trace: Trace) -> Iterator[tuple[str, str]]:
             yield said[0].place, text[:MAX_STATEMENT_LENGTH]
 
 
-def wording(trace: Trace) -> frozenset[str]:
-    """Return the texts that the robot says and the questions that it asks, in lower case."""
-    return frozenset(_plain(one.text) for one in trace if one.kind in {SAY, ASK})
-
-
 def count_conflicts(traces: Iterable[Trace], homes: Iterable[tuple[str, str]] = ()) -> int:
     """Count contradictions between runs in the same world.
 

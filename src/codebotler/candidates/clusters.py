@@ -15,7 +15,6 @@ from codebotler.candidates.behaviour import (
     names_in,
     people_sought,
     rooms_with_several,
-    wording,
 )
 from codebotler.checking.check import check_on
 from codebotler.checking.problems import CheckResult, Sample
@@ -27,7 +26,6 @@ from codebotler.checking.sampled import (
     unexplored_samplers,
 )
 from codebotler.checking.source.static import read_rooms
-from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.core.text.words import counted
 from codebotler.simulator.pool import shared_pool
@@ -82,13 +80,11 @@ class CandidateClusters:
     Args:
         clusters: at least one. If the check rejects all candidates, the only cluster has the first of them.
         rejected: for each rejected candidate that is not in a cluster, the first problem.
-        unwanted: the number of accepted candidates that behave like a refused program.
         people: the names of the people on the map, in lower case and without articles.
     """
 
     clusters: tuple[CandidateCluster, ...]
     rejected: tuple[str, ...] = ()
-    unwanted: int = 0
     people: frozenset[str] = frozenset()
 
     @property
@@ -104,10 +100,8 @@ class CandidateClusters:
             every = counted(self.total + len(some), "program")
             return f"the check rejected all of {every}; took the first"
         rejected = f"; the check rejected {len(some)}{main_reason(some)}" if some else ""
-        rejected += f"; {self.unwanted} would do what was not meant" if self.unwanted else ""
         if len(self.clusters) == 1:
-            other = "other " * bool(self.unwanted)
-            return f"all of {counted(self.total, f'{other}program')} behave alike{rejected}"
+            return f"all of {total} behave alike{rejected}"
         is_tie = self.clusters[1].size == largest.size  # they are in the order of their sizes
         most = "first of the most frequent behaviours" if is_tie else "most frequent behaviour"
         return f"took the {most}: {largest.size} of {total}{rejected}"
@@ -122,11 +116,7 @@ def main_reason(rejected: Sequence[str]) -> str:
 
 
 def cluster_candidates(
-    worker: Worker,
-    programs: Sequence[str],
-    settings: CheckSettings,
-    room_map: RoomMap | None = None,
-    refused: Sequence[str] = (),
+    worker: Worker, programs: Sequence[str], settings: CheckSettings, room_map: RoomMap | None = None
 ) -> CandidateClusters:
     """Check candidates, and group the accepted ones by behaviour in imagined worlds.
 
@@ -135,10 +125,6 @@ def cluster_candidates(
         programs: the candidates, at least one; equal ones count separately.
         settings: the settings of the check and of the runs.
         room_map: the rooms; by default all rooms that the programs name.
-        refused: programs that a person rejected. Candidates that behave like one of them are left out.
-
-    Raises:
-        UserError: all accepted candidates behave like a program that a person rejected.
     """
     counts = Counter(programs)
     checks = {program: check_on(worker, program, room_map, settings) for program in counts}
@@ -148,7 +134,7 @@ def cluster_candidates(
     if not accepted:
         return CandidateClusters((CandidateCluster((programs[0],), 1, (), ()),), rejected[1:])
     rooms = room_map or shared_rooms(accepted, [checks[one] for one in accepted], settings)
-    runs = run_in_shared_worlds(worker, [*accepted, *refused], rooms, settings)
+    runs = run_in_shared_worlds(worker, accepted, rooms, settings)
     traces = [sample.outcome.trace for samples in runs for sample in samples]
     names, several = names_in((*rooms.rooms, *rooms.people), traces), rooms_with_several(traces)
 
@@ -156,38 +142,24 @@ def cluster_candidates(
         return tuple(behaviour_of(one.outcome, rooms.start, names, several) for one in samples)
 
     behaviours = [*map(describe, runs)]
-    texts = [[wording(sample.outcome.trace) for sample in samples] for samples in runs]
     together: dict[tuple[Behaviour, ...], list[int]] = {}
-    # A person may have meant other words only, so if nothing else differs, the words count.
-    for number in _wanted(behaviours, len(accepted)) or _wanted(texts, len(accepted)):
-        together.setdefault(behaviours[number], []).append(number)
-    if not together:
-        again = counted(len(programs) - len(rejected), "program")
-        raise UserError(f"{again} would do what you rejected before; rephrase the instruction")
+    for number, seen in enumerate(behaviours):
+        together.setdefault(seen, []).append(number)
     clusters = [_cluster(some, accepted, counts, seen, runs) for seen, some in together.items()]
     people = frozenset(map(normalized, rooms.people))
     if any(conflicts_in_worlds(clusters, people).values()):
         more = _run_with_settled_people(worker, clusters, rooms, settings)
         clusters = [one.extended(new, describe(new)) for one, new in zip(clusters, more, strict=True)]
-    unwanted_count = len(programs) - len(rejected) - sum(one.size for one in clusters)
     clusters.sort(key=lambda one: (-one.size, one.in_vain))
-    return CandidateClusters(tuple(clusters), rejected, unwanted_count, people)
+    return CandidateClusters(tuple(clusters), rejected, people)
 
 
 def compare_candidates(
-    programs: Sequence[str],
-    settings: CheckSettings,
-    room_map: RoomMap | None = None,
-    refused: Sequence[str] = (),
+    programs: Sequence[str], settings: CheckSettings, room_map: RoomMap | None = None
 ) -> CandidateClusters:
     """Check and group candidates as `cluster_candidates` does, on a worker of this process's pool."""
     pool = shared_pool()
-    return pool.call(lambda: cluster_candidates(pool.here(), programs, settings, room_map, refused))
-
-
-def _wanted(seen: Sequence[object], count: int) -> list[int]:
-    """Return the positions of the first `count` entries that equal none of the refused ones after them."""
-    return [number for number in range(count) if seen[number] not in seen[count:]]
+    return pool.call(lambda: cluster_candidates(pool.here(), programs, settings, room_map))
 
 
 def _cluster(

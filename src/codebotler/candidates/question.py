@@ -82,7 +82,6 @@ class ClarifyingQuestion:
         total: the number of accepted candidates.
         sample: the number of the imagined world, from 0.
         rejected: for each candidate that the check rejected, the first problem.
-        unwanted: the number of accepted candidates that behave like a refused program.
         why_last: why the answer `none` would not lead to new programs; empty if it would.
     """
 
@@ -91,7 +90,6 @@ class ClarifyingQuestion:
     total: int
     sample: int
     rejected: tuple[str, ...] = ()
-    unwanted: int = 0
     why_last: str = ""
 
     @property
@@ -101,7 +99,6 @@ class ClarifyingQuestion:
         reasons = {
             "that would do something else": left,
             f"that the check rejects{main_reason(self.rejected)}": rejected,
-            "that would do what was not meant": self.unwanted,
         }
         parts = [f"{counted(number, 'program')} {why}" for why, number in reasons.items() if number]
         return f"Not shown: {listed(parts)}." if parts else ""
@@ -115,11 +112,6 @@ class ClarifyingQuestion:
     def supposition(self) -> str:
         """The facts of the world, as in ", supposing that Anne is in the lab"; empty if there are none."""
         return f", supposing that {listed([*map(shortened, self.facts)])}" if self.facts else ""
-
-    @property
-    def programs(self) -> tuple[str, ...]:
-        """The programs of the options."""
-        return tuple(one.program for one in self.options)
 
     @property
     def rejections(self) -> list[str]:
@@ -191,8 +183,7 @@ def question_about(
     why_last = "this is the second question" if is_second else ""
     why_last = "a recorded model writes no new programs" if is_recorded(model) else why_last
     facts = _facts_that_matter(shown, number)
-    left_out = groups.rejected, groups.unwanted
-    return ClarifyingQuestion(tuple(options), facts, groups.total, number, *left_out, why_last)
+    return ClarifyingQuestion(tuple(options), facts, groups.total, number, groups.rejected, why_last)
 
 
 def _share(shown: CandidateCluster, size: int, total: int) -> str:

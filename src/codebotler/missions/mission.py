@@ -132,6 +132,11 @@ class Mission:
         return self.summary.state
 
     @property
+    def is_approved(self) -> bool:
+        """Whether the program is approved or runs, also while this is still being logged."""
+        return self.state is MissionState.APPROVED or self.state.is_moving
+
+    @property
     def has_ended(self) -> bool:
         """Whether the mission has reached a final state."""
         return self.summary.has_ended

@@ -189,6 +189,11 @@ class MissionSession(SharedView):
             mission.approve(despite_problems=despite_problems, by=by)
             self.is_approved_by_person = is_person
 
+    @property
+    def is_approved(self) -> bool:
+        """Whether the program is approved, or runs. On a slow disk, the view shows it later."""
+        return self._mission is not None and self._mission.is_approved
+
     def reject(self, reason: str) -> None:
         """End the mission as failed, before it runs, and log the reason."""
         assert self._mission is not None, "there is a program to reject"
@@ -211,8 +216,6 @@ class MissionSession(SharedView):
         self._author.cancel()
         with self._lock:
             self._lock.notify_all()
-
-    # --- on its own thread
 
     def _run(self) -> None:
         try:
@@ -339,11 +342,10 @@ class MissionSession(SharedView):
     def _choose(self, mission: Mission, programs: Sequence[str]) -> None:
         """Take one of several programs, or ask the person which one is meant if they differ."""
         self._show(busy="comparing the programs")
-        refused = () if self._rejected is None else self._rejected.programs
         skills, rules = self._robot.skills, self._view.rules_in_force
         how = CheckSettings(skills=skills, house_rules=rules, is_wanted=self._is_wanted)
         try:
-            groups = compare_candidates(programs, how, self._view.room_map, refused)
+            groups = compare_candidates(programs, how, self._view.room_map)
         except (UserError, UnwantedCheckError):
             if self._is_wanted():
                 raise

@@ -88,7 +88,7 @@ class Console:
         self._lost: MissionSession | None = None  # whose robot may still move
         self._stopping = threading.Thread()  # sends a stop to that robot
         self._asking: StopButton | None = None  # of a robot that is asked where it is
-        self.was_stopped = False  # whether STOP was pressed since the start, also in another process
+        self.presses = 0  # of STOP since the start, also in another process
         self._began = 0.0  # the time at which the current session began
         self.used_elsewhere = ""  # a sentence about the process that used the robot at the last STOP
 
@@ -283,13 +283,14 @@ class Console:
         person must approve the next mission, even if there was nothing to stop.
         """
         with self._lock:
-            session, self._may_recover, self.was_stopped = self.session, None, True
+            session, self._may_recover = self.session, None
+            self.presses += 1
             lost = self._forget_loss()
             asking = self._asking
             is_active = asking is not None or (session is not None and not session.view.is_over)
             other = "" if is_active or lost is not None else Reservation(self.robot, self.home).holder()
             self.used_elsewhere = other and f"another tool ({other}) uses the robot"
-            is_approved = session is not None and session.view.is_approved
+            is_approved = session is not None and session.is_approved
             may_move = lost is not None or bool(self._hold.warning or other)
             stops = not only_moving or may_move or is_approved or asking is not None
             if session is not None and is_active and stops:
@@ -301,6 +302,7 @@ class Console:
             if holds:
                 self._stopped = session if stops else self._stopped
                 self._hold.write()
+        self.notifier.change()  # a click that was made before this press counts no more
         return stops and (is_active or lost is not None)
 
     def _forget_loss(self) -> MissionSession | None:

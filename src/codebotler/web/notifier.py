@@ -12,7 +12,7 @@ class Notifier:
     """Wakes all viewers after each change. They then read the latest view, so no queue can build up."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # a signal handler may take it again
         self._wakes: list[Callable[[], None]] = []
         self.is_closed = False
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import ipaddress
 import logging
 import signal
 import socket
@@ -127,10 +128,11 @@ def _links(place: PageAddress, own: str, access: Access, console: Console | None
 
 
 def _address(place: PageAddress, bound: socket.socket) -> str:
-    """Return the page's own address. It is not `localhost`, where another user may listen by IPv6."""
-    host, port = bound.getsockname()[:2]
-    shown = f"[{host}]" if ":" in host else host
-    return f"http://{shown if place.is_loopback else socket.gethostname()}:{port}/"
+    """Return the page's own address. Where `localhost` or this machine's name leads, others may listen."""
+    own, port = bound.getsockname()[:2]
+    is_every = ipaddress.ip_address(own).is_unspecified  # and its name leads to one of them
+    host = own if place.is_loopback else socket.gethostname() if is_every else place.host
+    return f"http://{f'[{host}]' if ':' in host else host}:{port}/"
 
 
 def _check_prefixes(app: FastAPI, place: PageAddress) -> None:

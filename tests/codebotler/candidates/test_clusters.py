@@ -15,7 +15,6 @@ from codebotler.candidates.clusters import (
 from codebotler.candidates.question import question_about
 from codebotler.checking.problems import CheckResult
 from codebotler.checking.sampled import CheckSettings
-from codebotler.core.errors import UserError
 from codebotler.rtl import parse
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.worker import Worker
@@ -173,19 +172,6 @@ def test_house_rules_reject_candidates(worker: Worker) -> None:
     visits = 'def task_program():\n    go_to("lab")\n'
     assert cluster(worker, visits, LOOKS).rejected == ()
     assert len(cluster(worker, visits, LOOKS, rules=(NO_LAB,)).rejected) == 1
-
-
-def test_other_words_count_if_nothing_else_differs_from_a_refused_program(worker: Worker) -> None:
-    lunch, dinner = (f"def task_program():\n    say('{what} is served')\n" for what in ("Lunch", "Dinner"))
-
-    def choose(*programs: str) -> list[str]:
-        found = cluster_candidates(worker, programs, CheckSettings(), ROOMS, refused=[lunch])
-        return [one.program for one in found.clusters]
-
-    assert choose(lunch, dinner) == [dinner]
-    assert choose(lunch, dinner, LOOKS) == [LOOKS], "a program that does something else is preferred"
-    with pytest.raises(UserError, match="2 programs"):
-        choose(lunch, lunch)
 
 
 def test_the_first_candidate_is_kept_if_all_are_rejected(worker: Worker) -> None:

@@ -67,12 +67,11 @@ def test_question_offers_at_most_the_three_largest_options() -> None:
     assert "1 program " in question.left_out
     assert not ask_about(cluster(2, "a", ONE), cluster(1, "b", TWO)).left_out
     clusters = CandidateClusters(
-        (cluster(2, "a", ONE), cluster(1, "b", TWO)), rejected=("no lab", "no hall", "no lab"), unwanted=4
+        (cluster(2, "a", ONE), cluster(1, "b", TWO)), rejected=("no lab", "no hall", "no lab")
     )
     rest = question_about(clusters)
     assert rest is not None
     assert "3 programs that the check rejects (2 of them: no lab)" in rest.left_out
-    assert "4 programs that would do what was not meant" in rest.left_out
 
 
 def test_an_option_that_waits_without_success_says_so() -> None:

@@ -68,7 +68,7 @@ def test_a_run_with_yes_is_no_approval_by_a_person(tmp_path: Path) -> None:
     robot = Simulated(World((Room("hall"),), "hall"))
     with Console(robot, tmp_path, lambda _: pytest.fail("no model")) as console:
         console.stop("a person at the page", holds=True)
-        console.was_stopped = False  # in another process
+        console.presses = 0  # in another process
         assert run(console, Request(str(tmp_path / "hello.py"), yes=True)) == 0
         console.begin(MissionOrder(program="def task_program():\n    say('hello')\n"))
         assert console.is_held

@@ -101,20 +101,13 @@ def test_none_of_these_adds_a_sentence_and_a_second_none_ends_the_mission(tmp_pa
         assert summary.instruction == "Do it. But quietly."
 
 
-def test_rejected_behaviour_is_not_taken_again(tmp_path: Path) -> None:
-    with start_session(tmp_path, STAY, FETCH, STAY) as (session, model):
+def test_what_was_rejected_may_be_right_with_the_added_words(tmp_path: Path) -> None:
+    """The question has shown only one case, and the words may be about another one."""
+    with start_session(tmp_path, STAY, FETCH) as (session, model):
         wait_for_person(session)
-        model.programs = [FETCH, GO, STAY]
-        session.answer(session.view.question, "none", "But quietly.")
-        view = session.wait_until(lambda view: view.may_be_approved)
-        assert view.program == GO
-        assert "2 would do what was not meant" in view.remarks[-1]
-    with start_session(tmp_path, STAY, FETCH) as (session, _):
-        wait_for_person(session)
-        session.answer(session.view.question, "none", "But quietly.")
-        view = session.wait_until(lambda _: False)
-        assert (view.state, view.program) == (MissionState.FAILED, "")
-        assert view.error
+        model.programs = [FETCH, FETCH]
+        session.answer(session.view.question, "none", "If nobody is there, be quiet.")
+        assert session.wait_until(lambda view: view.may_be_approved).program == FETCH
 
 
 def test_a_recorded_model_is_not_asked_again(tmp_path: Path) -> None:

@@ -554,6 +554,33 @@ def test_a_stop_between_the_approval_and_the_start_counts(tmp_path: Path) -> Non
         assert not session.view.progress.visited
 
 
+def test_a_stop_counts_while_the_approval_is_still_being_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a slow disk, this takes longer than a person needs to change their mind."""
+    writing, go_on, write = threading.Event(), threading.Event(), Mission._write
+
+    def slow(mission: Mission, event: str, /, **data: object) -> None:
+        if data.get("state") is MissionState.APPROVED:
+            writing.set()
+            go_on.wait(20)
+        write(mission, event, **data)
+
+    monkeypatch.setattr(Mission, "_write", slow)
+    with make_console(tmp_path, Simulated(WORLD, speed=None)) as console:
+        session = console.begin(MissionOrder(program=HELLO))
+        view = wait_until(console, lambda view: view.may_be_approved)
+        approving = threading.Thread(target=session.approve, args=(view.digest,))
+        approving.start()
+        assert writing.wait(20)
+        assert console.stop("a test", only_moving=True)
+        session._stop_button.ended.wait(20)
+        go_on.set()
+        approving.join()
+        assert wait_until(console, lambda view: view.is_over).state is MissionState.STOPPED
+        assert not session.view.progress.visited
+
+
 def test_a_draft_that_nobody_saw_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begun, go_on = threading.Event(), threading.Event()
 

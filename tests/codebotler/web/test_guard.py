@@ -10,7 +10,8 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from socket import create_connection
+from socket import create_connection, gethostname
+from urllib.parse import urlsplit
 
 import pytest
 from starlette.types import Message, Receive, Scope, Send
@@ -29,6 +30,7 @@ from codebotler.web.security.access import (
 )
 from codebotler.web.security.guard import MAX_AGENT_BODY_BYTES, MAX_BODY_BYTES, Guard, _is_same
 from codebotler.web.security.proxy import OuterAddress, proxies_in_front
+from codebotler.web.server import _address
 from command_line import ENVIRONMENT
 from forked import PAGE, Forked
 from pageserver import PageServer
@@ -189,6 +191,19 @@ def test_tries_with_wrong_tokens_are_limited(tmp_path: Path, monkeypatch: pytest
 def test_the_link_names_the_address_at_which_the_page_listens(server: PageServer) -> None:
     """Browsers try `localhost` by IPv6 first, where another user of the machine may listen."""
     assert server.link.startswith(f"http://127.0.0.1:{server.port}/")
+
+
+def test_the_link_leads_only_to_where_the_page_listens() -> None:
+    with PageAddress(port=0).listen() as bound:
+        port = bound.getsockname()[1]
+        shown = {
+            name: _address(PageAddress(name), bound) for name in ("127.0.0.1", "robot.example", "fd00::2")
+        }
+    assert shown["127.0.0.1"] == f"http://127.0.0.1:{port}/"
+    assert shown["robot.example"] == f"http://robot.example:{port}/", "not at what this machine is called"
+    assert shown["fd00::2"] == f"http://[fd00::2]:{port}/"
+    with PageAddress("0.0.0.0", 0).listen() as bound:
+        assert urlsplit(_address(PageAddress("0.0.0.0"), bound)).hostname == gethostname().lower()
 
 
 def test_wrong_tokens_do_not_keep_a_generated_token_from_a_stop(tmp_path: Path) -> None:

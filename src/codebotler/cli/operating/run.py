@@ -68,7 +68,7 @@ class Request:
     def order_on(self, console: Console) -> MissionOrder:
         """Return the mission to begin on the console. This reads the program file or standard input."""
         program = read_program(self.what) if self.is_program else ""
-        if console.was_stopped:  # while a person was asked what had happened
+        if console.presses:  # while a person was asked what had happened
             raise UserError("STOP was pressed before the mission began; run this command again")
         if self.past is not None:
             return console.rest_of(self.past, program)

@@ -114,9 +114,6 @@ def choose_candidate(
         room_map: the rooms; by default those that the programs name.
         count: how many programs to request.
         ask: asks a question and returns the typed line; if None, the most frequent behaviour is taken.
-
-    Raises:
-        UserError: all programs of the second round do what the person rejected.
     """
     rejected: ClarifyingQuestion | None = None
     while True:
@@ -129,9 +126,8 @@ def choose_candidate(
         if not programs and attempts[0].programless is not None:
             note_programless(attempts[0].programless)
             return None
-        refused = () if rejected is None else rejected.programs
         with busy("comparing the programs"):
-            groups = compare_candidates(programs, settings, room_map, refused)
+            groups = compare_candidates(programs, settings, room_map)
         question = question_about(groups, model=opened.name, is_second=rejected is not None)
         if question is None or ask is None:
             note(groups.summary if question is None else f"{groups.summary}; choose one on a terminal")

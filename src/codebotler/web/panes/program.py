@@ -18,6 +18,7 @@ from codebotler.checking.problems import CheckResult
 from codebotler.core.skills.declaration import by_name
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.display.view import SessionView
+from codebotler.missions.display.wording import BY_PAGE
 from codebotler.missions.storage.log import MissionState
 from codebotler.models.recorded import is_recorded
 from codebotler.web.console import MAX_PROGRAM_CHARACTERS, Console
@@ -120,7 +121,7 @@ class ProgramPane:
             ],
             "editable": view.may_be_edited,
             "received": self._received,
-            "approval": _approval(view),
+            "approval": self._approves(view),
             "replaced": self._review_until,
             "force": force,
         }
@@ -195,17 +196,25 @@ class ProgramPane:
         look = "plain" if is_unfinished(view) else "go risky" if view.problems else "go"
         self._run.classes(add=look, remove="plain go risky")
 
+    def _approves(self, view: SessionView) -> list[object]:
+        """Return what a click on a page that shows this view approves, after the presses of STOP so far."""
+        return [self._console.presses, view.number, view.digest, *view.disabled_rules]
+
     async def _approve(self, seen: dict[str, Any]) -> None:
         """Approve the program that the browser showed at the click, which may come late, or refuse."""
-        session, view = self._console.session, self._view
+        session, view, presses = self._console.session, self._view, self._console.presses
         program, is_reviewed = _for_editor(view.program), seen["age"] >= 1000 * REVIEW_SECONDS
-        if self._may_rerun(view):
+        if seen["approval"][0] != presses:
+            self._restore("Somebody pressed STOP; look at the program again.")
+        elif self._may_rerun(view):
             self._console.edit(view.program)
-        elif session and is_reviewed and (seen["text"], seen["approval"]) == (program, _approval(view)):
+        elif session and is_reviewed and (seen["text"], seen["approval"]) == (program, self._approves(view)):
             despite, rules = bool(self._despite.value), view.disabled_rules
             await asyncio.to_thread(
                 session.approve, view.digest, despite_problems=despite, disabled_rules=rules
             )
+            if self._console.presses != presses:
+                session.stop_soon(BY_PAGE)
             scroll_up()
         elif is_reviewed and seen["text"] == program:
             ui.notify("Checking your last edit first.", position="bottom")
@@ -237,11 +246,6 @@ def storyboard_of(view: SessionView, check: CheckResult) -> Storyboard:
     if view.is_over and view.state in EARLY_ENDS:
         end = "failed" if view.state is MissionState.FAILED else "stopped"
     return Storyboard(check, storyboard_title(view), visited, view.progress.learned, end)
-
-
-def _approval(view: SessionView) -> list[object]:
-    """Return what a click on a page that shows this view approves."""
-    return [view.number, view.digest, *view.disabled_rules]
 
 
 def _author_text(view: SessionView) -> str:
