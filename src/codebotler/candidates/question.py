@@ -11,7 +11,7 @@ from itertools import chain, groupby
 from operator import and_, itemgetter
 from typing import Any, Literal, TypeAlias
 
-from codebotler.candidates.behaviour import Behaviour, rooms_with_several
+from codebotler.candidates.behaviour import Behaviour, people_sought, rooms_with_several
 from codebotler.candidates.clusters import (
     CandidateCluster,
     CandidateClusters,
@@ -29,7 +29,7 @@ from codebotler.core.text.words import brief, counted, elide_list, listed
 from codebotler.core.trace import Event, Outcome, Status
 from codebotler.models.recorded import is_recorded
 from codebotler.simulator.worlds.matching import SOMEBODY, normalized
-from codebotler.simulator.worlds.sampled_facts import ANSWER_FORM, SampledFact
+from codebotler.simulator.worlds.sampled_facts import ABSENT_FORM, ANSWER_FORM, PRESENT_FORM, SampledFact
 
 DOMINANT_SHARE = 0.75
 """The largest cluster is taken without a question if it has at least this share of the candidates."""
@@ -228,9 +228,15 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
     same = [world for world in range(len(shown[0].samples)) if len({o.behaviours[world] for o in shown}) == 1]
     alike = [set(facts(world)) for world in same]
     telling = [fact for fact in facts(number) if not alike or not all(fact in one for one in alike)]
+    # Where a person is says also where the person is not.
+    people = {name for name, _ in people_sought(one.samples[number].outcome.trace for one in shown)}
+    known = [one for one in facts(number) if one.form == PRESENT_FORM and one.names[0] in people]
+    homes = {one.names[0]: one for one in known}
+    telling = [homes.get(one.names[0], one) if one.form == ABSENT_FORM else one for one in telling]
     rooms: dict[str, list[str]] = {}  # of each person or thing that is in several ones
     # The steps of each option show all answers.
-    for one in [one for one in telling if one.form != ANSWER_FORM] or telling or facts(number):
+    explained = [one for one in telling if one.form != ANSWER_FORM] or telling or facts(number)
+    for one in dict.fromkeys(explained):
         is_in = one.form.endswith(' in "{}"')
         what, _, room = one.sentence.rpartition(' "') if is_in else (one.sentence, "", "")
         rooms.setdefault(what, []).append(f'"{room}' * is_in)

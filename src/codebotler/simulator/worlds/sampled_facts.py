@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from codebotler.core.text.words import brief
 from codebotler.simulator.worlds.matching import SOMEBODY, contains
 
+PRESENT_FORM, ABSENT_FORM = '"{}" is in "{}"', '"{}" is not in "{}"'
 ANSWER_FORM = 'the answer in "{}" to "{}" is "{}"'
 
 
@@ -35,7 +36,7 @@ def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True)
     """Return the fact that a person or thing is, or is not, in a room. `name` must be `normalized`."""
     if name == SOMEBODY:
         return SampledFact(f'{SOMEBODY if is_there else "nobody"} is in "{{}}"', (room,), is_random)
-    return SampledFact(f'"{{}}" {"is" if is_there else "is not"} in "{{}}"', (name, room), is_random)
+    return SampledFact(PRESENT_FORM if is_there else ABSENT_FORM, (name, room), is_random)
 
 
 # --- the program's knowledge, by canonical names
