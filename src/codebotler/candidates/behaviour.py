@@ -6,8 +6,9 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
-from functools import lru_cache
+from functools import lru_cache, reduce
 from itertools import groupby
+from operator import or_
 from typing import NamedTuple, TypeAlias
 
 from codebotler.core.skills.kinds import ASK, CHECK, GOTO, PICK, PLACE, SAY
@@ -125,6 +126,17 @@ def people_sought(traces: Iterable[Trace]) -> set[tuple[str, str]]:
     """Return the people that runs looked for or asked, as (name, room) pairs."""
     found = (one for trace in traces for one in _encounters(trace))
     return {(one.name, one.room) for one in found if one.is_person and one.name != SOMEBODY}
+
+
+def count_in_other_rooms(traces: Iterable[Trace]) -> int:
+    """Count the people and things that runs in the same world find in different rooms, but each in only one.
+
+    So there may be one charger, where each run takes the first that it finds, but not if a run finds two.
+    """
+    rooms = [{(one.name, one.room) for one in _encounters(trace) if one.is_there} for trace in traces]
+    per_run = [Counter(name for name, _ in found) for found in rooms]
+    in_all = Counter(name for name, _ in reduce(or_, rooms))
+    return sum(count > 1 and all(one[name] <= 1 for one in per_run) for name, count in in_all.items())
 
 
 class Encounter(NamedTuple):

@@ -11,7 +11,7 @@ from itertools import chain, groupby
 from operator import and_, itemgetter
 from typing import Any, Literal, TypeAlias
 
-from codebotler.candidates.behaviour import Behaviour, people_sought, rooms_with_several
+from codebotler.candidates.behaviour import Behaviour, count_in_other_rooms, people_sought, rooms_with_several
 from codebotler.candidates.clusters import (
     CandidateCluster,
     CandidateClusters,
@@ -199,7 +199,8 @@ def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, ...]:
     """Rank a world: by the number of options, their candidates, what a person cares about, and brevity.
 
     Options that all act, but in different rooms, differ more than those that only say something else. Where
-    an option searches, or does more, especially the first one, a person sees better what it is for.
+    an option searches, or does more, especially the first one, a person sees better what it is for. A thing
+    or person that options find in different rooms confuses.
     """
     first, *others = (one.behaviours[number] for one in shown)
     cares = sum(bool(first.differences(other) & NOTICED_FIRST) for other in others)
@@ -209,7 +210,8 @@ def _rank(shown: Sequence[CandidateCluster], number: int) -> tuple[int, ...]:
     looks = [[(event.text, event.found) for event in trace if event.kind == CHECK] for trace in traces]
     searches = any((text, False) in some[:n] for some in looks for n, (text, seen) in enumerate(some) if seen)
     actions, brevity = sum(map(len, acts)), -sum(map(len, traces))
-    return len(shown), sizes, cares, apart, searches, len(acts[0]), actions, brevity
+    elsewhere = -count_in_other_rooms(traces)
+    return len(shown), sizes, cares, elsewhere, apart, searches, len(acts[0]), actions, brevity
 
 
 def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[str, ...]:
@@ -240,8 +242,8 @@ def _facts_that_matter(shown: Sequence[CandidateCluster], number: int) -> tuple[
         is_in = one.form.endswith(' in "{}"')
         what, _, room = one.sentence.rpartition(' "') if is_in else (one.sentence, "", "")
         rooms.setdefault(what, []).append(f'"{room}' * is_in)
-    sentences = [f"{what} {listed(sorted(some))}".rstrip() for what, some in rooms.items()]
-    return tuple(elide_list(sentences, MAX_QUESTION_FACTS))
+    listings = [(what, listed(elide_list(sorted(some), MAX_QUESTION_FACTS))) for what, some in rooms.items()]
+    return tuple(elide_list([f"{what} {some}".rstrip() for what, some in listings], MAX_QUESTION_FACTS))
 
 
 def describe_differences(

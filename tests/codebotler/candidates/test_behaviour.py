@@ -8,11 +8,12 @@ from codebotler.candidates.behaviour import (
     behaviour_of,
     claims_of,
     count_conflicts,
+    count_in_other_rooms,
     names_in,
     rooms_with_several,
     statements,
 )
-from codebotler.core.trace import Event, Outcome, RunError, Status, to_options
+from codebotler.core.trace import Event, Outcome, RunError, Status, Trace, to_options
 
 START = "hall"
 NAMES = names_in([START, "office 1", "office 2"], [(Event("check", "the mug"), Event("check", "person"))])
@@ -168,3 +169,14 @@ def test_a_room_does_not_have_two_things_for_one_run_and_one_for_another() -> No
     assert count_conflicts([(pick,), (pick, look)]) == 0
     assert count_conflicts([(pick, pick), (pick, put, look)]) == 0, "the robot has put it there"
     assert count_conflicts([(pick,), (look,)]) == 1
+
+
+def test_one_thing_is_confusing_in_several_rooms_unless_a_run_finds_several() -> None:
+    def looks(*rooms: str) -> Trace:
+        return tuple(Event("check", "mug", found=True, place=room) for room in rooms)
+
+    assert count_in_other_rooms([looks("lab"), looks("den")]) == 1
+    assert count_in_other_rooms([looks("lab"), looks("lab"), ()]) == 0
+    assert count_in_other_rooms([looks("lab", "den"), looks("den")]) == 0, "there are several mugs"
+    missed = (Event("check", "mug", found=False, place="den"),)
+    assert count_in_other_rooms([looks("lab"), missed]) == 0

@@ -309,6 +309,16 @@ def test_different_answers_to_the_same_words_are_no_facts() -> None:
     assert ask_about(*only).facts == (facts[0].sentence,)
 
 
+def test_a_person_who_is_somewhere_is_not_also_said_to_be_absent_elsewhere() -> None:
+    lab, den = (whereabouts("ann", room, is_there=room == "den") for room in ("lab", "den"))
+    looks = (Event("check", "Ann", found=False, place="lab"), Event("check", "Ann", found=True, place="den"))
+    clusters = [
+        replace(one, samples=(replace(one.samples[0], facts=(lab, den)),))
+        for one in (cluster(1, "a", (*looks, *ONE)), cluster(1, "b", (*looks, *TWO)))
+    ]
+    assert ask_about(*clusters).facts == (den.sentence,)
+
+
 def test_sentence_names_what_is_said_and_where() -> None:
     rooms = ["lab", "den", "attic", "cellar", "study"]
     everywhere = tuple(event for one in rooms for event in (drive("", one), say("Lunch!", one)))
