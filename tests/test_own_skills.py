@@ -202,6 +202,7 @@ def test_a_suite_is_evaluated_and_mutated_from_the_command_line(own: Own, tmp_pa
     shown = CliRunner().invoke(roboeval, ["show", run, "--suite", str(own.folder)])
     assert shown.exit_code == 0, shown.output
     words = ["run", "--model", "recorded:careful", "--suite", str(own.folder), "--no-report"]
+    words += ["--num-completions", "2"]  # a prompt has two different programs at most
     passed = CliRunner().invoke(roboeval, [*words, "--out", str(tmp_path / "careful")])
     assert "pass@1 over all prompts: 1.000" in passed.output, passed.output
     again = ["resample", str(tmp_path / "careful"), "--suite", str(own.folder), "--json"]

@@ -114,9 +114,9 @@ def command(
     return Ended(status, texts[0], PROGRESS.sub("", texts[1]))
 
 
-def forked(name: str, *arguments: str | Path) -> Ended:
-    """Run a command in a process of its own where this one is taken, as by Playwright and its event loop."""
-    running = Forked(name, *arguments, cwd=Path.cwd(), environment=ENVIRONMENT)
+def forked(name: str, *arguments: str | Path, cwd: Path | None = None) -> Ended:
+    """Run a command or a script in a process of its own, forked from one that has imported what most need."""
+    running = Forked(name, *arguments, cwd=cwd or Path.cwd(), environment=ENVIRONMENT)
     out, err = running.communicate()
     return Ended(running.wait(), out, PROGRESS.sub("", err))
 

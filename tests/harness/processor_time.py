@@ -24,7 +24,7 @@ def used() -> float:
     """Return the processor seconds of this process and of all its descendants so far."""
     while True:
         ended = os.times()[2:4]
-        running = sum(_used_by(child) for child in _children(os.getpid()))
+        running = sum(used_by(child) for child in _children(os.getpid()))
         if os.times()[2:4] == ended:  # otherwise a child has ended and may be missing from both
             return time.process_time() + sum(ended) + running
 
@@ -43,13 +43,13 @@ def _children(pid: int) -> list[int]:
         return [int(child) for file in files for child in file.split()]
 
 
-def _used_by(pid: int) -> float:
+def used_by(pid: int) -> float:
     """Return the processor seconds of a child, of those it has waited for, and of its descendants."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()
     except OSError:
         return 0.0
-    return sum(map(int, fields[11:15])) / TICKS + sum(map(_used_by, _children(pid)))
+    return sum(map(int, fields[11:15])) / TICKS + sum(map(used_by, _children(pid)))
 
 
 class ProcessorTime:

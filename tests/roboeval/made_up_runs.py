@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import polars as pl
+import pytest
 
 from codebotler.simulator.settings import SimulationSettings
 from made_results import VERDICT, results_of
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import RunFolder
 from roboeval.report.runs import JudgedRun
+from roboeval.report.writing import FIGURE_FORMATS
 from roboeval.suites.load import Suite
 from small_run import TASK
 
@@ -42,6 +44,13 @@ NO_PROGRAM = (("NoProgram", "cut-off"), ("NoProgram", "tool-call"), *FAILURES)
 PROGRAM = 'def task_program():\n    say("hello")\n'
 UNCHECKED = pl.lit(None)
 RUNS = pl.col("passed") | (pl.col("failure_class") == "TaskCompletionError")
+
+
+def leave_figures_empty(patch: pytest.MonkeyPatch) -> None:
+    """Let reports draw their figures but write empty files, since that takes most of their time."""
+    dot = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
+    files = {"svg": dot, **dict.fromkeys(FIGURE_FORMATS, b"")}
+    patch.setattr("roboeval.report.writing.render", lambda _: files)
 
 
 def new_run(

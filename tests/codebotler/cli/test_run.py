@@ -399,9 +399,9 @@ def test_home_that_is_not_a_folder_is_refused(folder: Path, what: str) -> None:
 @pytest.mark.slow
 def test_home_that_cannot_be_created_is_refused(folder: Path) -> None:
     words = ("run", "good.py", "--yes", "--world", "world.yaml")
-    process = start(folder, *words, wrapper=["env", "CODEBOTLER_HOME=/sys/home"])
-    _, err = process.communicate("", timeout=60)
-    assert process.returncode == 2
+    environment = variables(folder) | {"CODEBOTLER_HOME": "/sys/home"}
+    status, out, err = command("codebotler", *words, cwd=folder, environment=environment)
+    assert (status, out) == (2, "")
     assert re.fullmatch(r"codebotler: /sys/home/\w+: .*CODEBOTLER_HOME to another folder\n", err)
 
 

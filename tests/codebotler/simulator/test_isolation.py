@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from command_line import Ended, forked
+
 NOBODY = 65534
 ROOT = os.geteuid() == 0
 BECOME = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups"]
@@ -172,38 +174,27 @@ main()
 MISSING = r"(roboeval: )?[^\n]*less isolated[^\n]*kernel does not allow[^\n]*\(seccomp\)\n"
 
 
-def run_evaluate(*options: str, before: str = "import sys") -> subprocess.CompletedProcess[str]:
+def run_evaluate(*options: str, before: str = "import sys") -> Ended:
     """Run `roboeval evaluate` in a process that executes some code first."""
     arguments = ["evaluate", "recorded:careful", "--tasks", "SayGoodDay", "--json", *options]
-    return subprocess.run(
-        [sys.executable, "-c", before + EVALUATE, *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
-
-
-def remove_progress(output: str) -> str:
-    """Remove the progress that a slow machine shows after a while."""
-    return re.sub(r"^judging: .*\n", "", output, flags=re.MULTILINE)
+    return forked("-c", before + EVALUATE, *arguments)
 
 
 @pytest.mark.slow
 def test_missing_seccomp_is_one_warning_and_changes_no_verdict() -> None:
     below, bare = run_evaluate(before=BELOW_A_FILTER), run_evaluate()
-    assert below.returncode == 0
-    assert re.fullmatch(MISSING, remove_progress(below.stderr))
-    assert (bare.returncode, remove_progress(bare.stderr)) == (0, "")
-    assert below.stdout == bare.stdout != ""
+    assert below.status == 0
+    assert re.fullmatch(MISSING, below.err)
+    assert (bare.status, bare.err) == (0, "")
+    assert below.out == bare.out != ""
 
 
 @pytest.mark.slow
 def test_required_isolation_fails_without_seccomp() -> None:
     refused = run_evaluate("--require-isolation", before=BELOW_A_FILTER)
-    assert (refused.returncode, refused.stdout) == (1, "")
-    assert re.fullmatch(MISSING, refused.stderr)
-    assert run_evaluate("--require-isolation").returncode == 0
+    assert (refused.status, refused.out) == (1, "")
+    assert re.fullmatch(MISSING, refused.err)
+    assert run_evaluate("--require-isolation").status == 0
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from codebotler.core.trace import Event, Option, Outcome, RunError, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.settings import SimulationSettings
+from haste import hasten
 
 pytestmark = pytest.mark.shared_engine
 
@@ -621,14 +622,12 @@ def outcomes() -> Outcomes:
 @pytest.fixture(scope="module")
 def slow_outcomes() -> Outcomes:
     """Return the outcomes of programs that the engine must end, with an honest program after each."""
-    return run_all(
-        {
-            name: source
-            for slow in SLOW
-            for name, source in ((slow, FAILS[slow][0]), (f"after {slow}", HONEST))
-        },
-        SimulationSettings(),
-    )
+    programs = {
+        name: source for slow in SLOW for name, source in ((slow, FAILS[slow][0]), (f"after {slow}", HONEST))
+    }
+    with pytest.MonkeyPatch.context() as patch:
+        hasten(patch)
+        return run_all(programs, SimulationSettings())
 
 
 @pytest.mark.parametrize("name", WORKS)

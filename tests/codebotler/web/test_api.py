@@ -22,6 +22,7 @@ from codebotler.core.world import Room, World
 from codebotler.missions.storage.store import read_missions
 from codebotler.robots.simulated import OFFICE
 from ended import cut, failed_mission, line_of
+from forked import PAGE, Forked
 from pageserver import SERVE, WORLD, PageServer
 from server import Server
 
@@ -315,18 +316,12 @@ def test_error_without_a_mission_says_how_to_begin_one(fresh: PageServer) -> Non
 @pytest.mark.slow
 def test_unwritable_home_is_refused_before_the_page_starts(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text(WORLD)
-    ended = subprocess.run(
-        [sys.executable, "-m", "codebotler", *SERVE[1:], "--port", "0"],
-        cwd=tmp_path,
-        env={**os.environ, "CODEBOTLER_HOME": "/sys/home"},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
-    assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
-    assert ended.stderr.startswith("codebotler: /sys/home: ")
-    assert "CODEBOTLER_HOME" in ended.stderr
+    environment = {**os.environ, "CODEBOTLER_HOME": "/sys/home"}
+    process = Forked(*SERVE, "--port", "0", cwd=tmp_path, environment=environment, preload=PAGE)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("codebotler: /sys/home: ")
+    assert "CODEBOTLER_HOME" in err
 
 
 def test_home_that_becomes_unwritable_raises_one_sentence(fresh: PageServer) -> None:

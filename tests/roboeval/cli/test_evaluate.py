@@ -16,7 +16,7 @@ import pytest
 
 import shared_workers
 from codebotler.simulator.worker import Worker
-from command_line import ENVIRONMENT, Ended, refused, roboeval
+from command_line import ENVIRONMENT, Ended, forked, refused, roboeval
 from forked import Forked
 from roboeval import load_results
 from roboeval.analysis.counting import counts
@@ -330,15 +330,28 @@ def test_a_wrong_row_leaves_no_files(tmp_path: Path, verb: str, out: str) -> Non
 
 
 FULL = r"[^\n]*: File too large; [^\n]*\n"
-SMALL_DISK = "ulimit -f 900;"  # The limit of the size of a file, in KiB.
+SMALL_DISK = 900  # The limit of the size of a file, in KiB.
 LONG = 'def task_program(): say("good day " * 1000)\n'
+ON_A_DISK = """
+import resource, sys
+from roboeval.cli.app import main
+sys.argv[0] = "roboeval"
+size = int(sys.argv.pop(1)) * 1024
+resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+main()
+"""
+
+
+def roboeval_on_a_disk(size: int, *words: str, cwd: Path) -> Ended:
+    """Run a command in a process of its own, which writes no file of more than so many KiB."""
+    return forked("-c", ON_A_DISK, str(size), *words, cwd=cwd)
 
 
 @pytest.mark.slow
 def test_an_evaluation_continues_after_a_full_disk(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("".join(row(index, f"{LONG}# {index}") for index in range(30)))
     assert roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
-    ended = roboeval("evaluate", "run", cwd=tmp_path, before=SMALL_DISK)
+    ended = roboeval_on_a_disk(SMALL_DISK, "evaluate", "run", cwd=tmp_path)
     assert (ended.status, ended.out) == (1, "")
     assert re.fullmatch(r"roboeval: run/evaluations/paper\.jsonl" + FULL, ended.err)
     rows = (tmp_path / "run" / "evaluations" / "paper.jsonl").read_bytes()
@@ -351,7 +364,7 @@ def test_an_evaluation_continues_after_a_full_disk(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_full_disk_leaves_no_incomplete_run(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("".join(row(index, "#" * 100_000) for index in range(12)))
-    ended = roboeval("import", "a.jsonl", "--out", "new/run", cwd=tmp_path, before=SMALL_DISK)
+    ended = roboeval_on_a_disk(SMALL_DISK, "import", "a.jsonl", "--out", "new/run", cwd=tmp_path)
     assert (ended.status, ended.out) == (1, "")
     assert re.fullmatch(r"roboeval: new/run/completions\.jsonl" + FULL, ended.err)
     assert [path.name for path in tmp_path.iterdir()] == ["a.jsonl"]
@@ -364,8 +377,7 @@ def test_a_full_disk_leaves_an_exported_table_unchanged(tmp_path: Path) -> None:
     for kind in ("csv", "parquet"):
         assert roboeval("export", "run", "--format", kind, "--out", "table", cwd=tmp_path).status == 0
         as_it_was = (tmp_path / "table").read_bytes()
-        limit = "ulimit -f 1;"
-        ended = roboeval("export", "run", "--format", kind, "--out", "table", cwd=tmp_path, before=limit)
+        ended = roboeval_on_a_disk(1, "export", "run", "--format", kind, "--out", "table", cwd=tmp_path)
         assert ended.status == 1, ended
         assert re.fullmatch("roboeval: table" + FULL, ended.err)
         assert (tmp_path / "table").read_bytes() == as_it_was

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,14 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.fixture(scope="module")
+def careful(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A judged run of careful programs."""
+    folder = tmp_path_factory.mktemp("careful")
+    assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
+    return folder / "run"
+
+
 def evaluate_with_rules(folder: Path, *more: str) -> bytes:
     ended = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, *more, cwd=folder)
     assert ended.status == 0, ended.err
@@ -41,8 +50,8 @@ def evaluate_with_rules(folder: Path, *more: str) -> bytes:
 
 
 @pytest.mark.slow
-def test_verdicts_with_rules_are_kept_apart_from_those_without(folder: Path) -> None:
-    assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
+def test_verdicts_with_rules_are_kept_apart_from_those_without(folder: Path, careful: Path) -> None:
+    shutil.copytree(careful, folder / "run")
     plain = (folder / "run" / "evaluations" / "paper.jsonl").read_bytes()
     ended = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)
     assert "of a prompt's programs break a house rule (95% interval" in ended.out
@@ -85,11 +94,11 @@ def count_accepted(folder: Path, *arguments: str) -> int:
 
 
 @pytest.mark.slow
-def test_rejection_sampling_rejects_programs_that_break_a_rule(folder: Path) -> None:
+def test_rejection_sampling_rejects_programs_that_break_a_rule(folder: Path, careful: Path) -> None:
     of_suite = ("--suite", "rules", "--tasks", "FetchMugConflict")
     assert roboeval("evaluate", "recorded:hasty", *of_suite, "--out", "own", cwd=folder).status == 0
     assert count_accepted(folder, "own", "--suite", "rules") == 1  # One of the two breaks no rule.
-    assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
+    shutil.copytree(careful, folder / "run")
     evaluate_with_rules(folder)
     without = count_accepted(folder, "run")
     assert count_accepted(folder, "run", "--rules", "house.yaml") < without
@@ -97,10 +106,10 @@ def test_rejection_sampling_rejects_programs_that_break_a_rule(folder: Path) -> 
 
 
 @pytest.mark.slow
-def test_an_interval_without_variation_is_unknown(folder: Path) -> None:
+def test_an_interval_without_variation_is_unknown(folder: Path, careful: Path) -> None:
     rule = "rules: [{name: silent, says: Say nothing., always: 'not tr.Exists(goto(\".*\"))'}]"
     (folder / "house.yaml").write_text(rule)
-    assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
+    shutil.copytree(careful, folder / "run")
     shown = roboeval("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder).out
     assert "100.0% of a prompt's programs" in shown
     assert "(95% interval over tasks unknown: no variation between tasks)" in " ".join(shown.split())
@@ -121,8 +130,8 @@ def test_rows_are_the_same_with_any_workers_and_processes(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_changed_rules_cannot_continue_an_evaluation(folder: Path) -> None:
-    assert roboeval("evaluate", "recorded:careful", "--out", "run", *TASKS, cwd=folder).status == 0
+def test_changed_rules_cannot_continue_an_evaluation(folder: Path, careful: Path) -> None:
+    shutil.copytree(careful, folder / "run")
     evaluate_with_rules(folder)
     (folder / "house.yaml").write_text(RULES.replace("3)", "4)"))
     found = refused("evaluate", "run", "--rules", "house.yaml", *TASKS, cwd=folder)

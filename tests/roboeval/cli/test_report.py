@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from command_line import refused, roboeval
+from command_line import ENVIRONMENT, refused, roboeval
+from forked import Forked
 from seals import unseal
 
 
@@ -64,17 +65,24 @@ finally:
 """
 
 
+@pytest.fixture(scope="module")
+def judged_thrice(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a run that has three evaluations."""
+    folder = tmp_path_factory.mktemp("thrice")
+    shutil.copytree(runs / "hasty", folder / "run")
+    for other in (("--ablation",), ("--suite", "plus")):
+        assert roboeval("evaluate", "run", *other, cwd=folder).status == 0
+    return folder
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "command", ["report run --out report --beside plus", "compare run --suites paper,plus", "show run"]
 )
-def test_completions_are_read_once_for_all_evaluations(command: str, runs: Path, tmp_path: Path) -> None:
-    shutil.copytree(runs / "hasty", tmp_path / "run")
-    for other in (("--ablation",), ("--suite", "plus")):
-        assert roboeval("evaluate", "run", *other, cwd=tmp_path).status == 0
-    code = [sys.executable, "-c", COUNTING, *command.split()]
-    ended = subprocess.run(code, cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert ended.stderr.splitlines()[-1] == "[1, 1]"
+def test_completions_are_read_once_for_all_evaluations(command: str, judged_thrice: Path) -> None:
+    process = Forked("-c", COUNTING, *command.split(), cwd=judged_thrice, environment=ENVIRONMENT)
+    _, err = process.communicate()
+    assert (process.returncode, err.splitlines()[-1]) == (0, "[1, 1]"), err
 
 
 @pytest.mark.slow

@@ -184,7 +184,7 @@ def test_processes_end_with_their_parent(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_many_programs_are_judged_in_processes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("codebotler.simulator.pool.cores", lambda: 3)
-    monkeypatch.setattr(engine_choice, "MIN_PROGRAMS_FOR_PROCESSES", 80)
+    monkeypatch.setattr(engine_choice, "MIN_PROGRAMS_FOR_PROCESSES", 20)
     chosen: list[str] = []
 
     def record_choice(engine: type[Local | Processes]) -> None:
@@ -198,10 +198,12 @@ def test_many_programs_are_judged_in_processes(monkeypatch: pytest.MonkeyPatch, 
 
     record_choice(Local)
     record_choice(Processes)
+    few = ["recorded:hasty", "--tasks", "SayGoodDay"]  # 13 programs
+    many = ["recorded:hasty", "--tasks", "LunchTime,SayGoodDay"]  # 28 programs
     with monkeypatch.context() as patch:
         patch.setattr("codebotler.simulator.pool.cores", lambda: 2)
-        assert roboeval("evaluate", "recorded:hasty", "--workers", "3").status == 0
-    for words in (["--tasks", "SayGoodDay", "--workers", "3"], ["--workers", "2"], ["--workers", "3"]):
-        ended = roboeval("evaluate", "recorded:hasty", *words, cwd=tmp_path)
+        assert roboeval("evaluate", *many, "--workers", "3").status == 0
+    for words in ([*few, "--workers", "3"], [*many, "--workers", "2"], [*many, "--workers", "3"]):
+        ended = roboeval("evaluate", *words, cwd=tmp_path)
         assert ended.status == 0, ended.err
     assert chosen == ["Local", "Local", "Local", "Processes"]

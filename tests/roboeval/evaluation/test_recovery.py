@@ -194,14 +194,23 @@ def test_equal_requests_are_sent_once() -> None:
     assert sorted(model.asked) == ["a", "bad"]
 
 
+@pytest.fixture(scope="module")
+def faults(worker: Worker) -> list[FaultResult | Interruption]:
+    """The faults in the first right program of each prompt of `paper`."""
+    paper = load_suite()
+    found = find_first_right(worker, paper, recorded_completions("recorded:careful", paper))
+    return [fault for each in found for fault in each]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["careful", "hasty"])
-def test_careful_continuations_pass_and_hasty_ones_do_not(worker: Worker, name: str) -> None:
+def test_careful_continuations_pass_and_hasty_ones_do_not(
+    worker: Worker, faults: list[FaultResult | Interruption], name: str
+) -> None:
     suite = load_suite()
     model = recorded_model_for(f"recorded:{name}", suite)
-    found = find_first_right(worker, suite, recorded_completions("recorded:careful", suite))
     used, ends = set(), defaultdict(set)
-    for one in (fault for each in found for fault in each):
+    for one in faults:
         if isinstance(one, Interruption) and (program := _recorded_rest(model, one)) is not None:
             used.add(program)
             result = try_continuation(worker, suite, one, program)
