@@ -108,6 +108,7 @@ AFTER_HOLD = "After a STOP or a lost robot, your yes also lets agents act within
 class ProposedProgram(NamedTuple):
     """A mission to approve, with the problems and the switched-off house rules to show to the person."""
 
+    presses: int  # of STOP, before the person is asked
     session: MissionSession
     problems: tuple[str, ...]
     disabled_rules: tuple[str, ...]
@@ -115,10 +116,11 @@ class ProposedProgram(NamedTuple):
 
 async def find_proposed(digest: str, ctx: AgentContext) -> ProposedProgram:
     """Return the mission to approve. Raise ToolError if the current mission does not have this digest."""
+    presses = gatekeeper_of(ctx).console.presses
     with as_tool_errors():
         session = gatekeeper_of(ctx).find_session(digest)
     view = session.view
-    return ProposedProgram(session, view.problems, view.disabled_rules)
+    return ProposedProgram(presses, session, view.problems, view.disabled_rules)
 
 
 def ask_person(

@@ -296,6 +296,8 @@ def _take_answer(
                 session.approve(digest, by=f"the contract given at the start, for {client}", is_person=False)
         case AcceptedElicitation(data=Consent(approve=True)):
             if view.may_be_approved:  # otherwise somebody has approved it on the page meanwhile
+                if gatekeeper.console.presses != proposed.presses:
+                    raise MissionError("somebody pressed STOP since the question; call run_mission again")
                 if view.problems != proposed.problems:
                     raise MissionError("the problems of the program have changed; call run_mission again")
                 despite, disabled = bool(view.problems), proposed.disabled_rules

@@ -60,7 +60,7 @@ class CandidateOption:
         difference: how it differs from the other options, such as "ends in kitchen".
         course: all that it says, asks and moves, and where it ends.
         own: the numbers, from 1, of the steps that not all options share.
-        share: how many candidates behave like it, and in how many worlds it waits without success, in words.
+        share: how many candidates behave like it, and whether it may wait without success, in words.
     """
 
     program: str = field(repr=False)
@@ -187,10 +187,9 @@ def question_about(
 
 
 def _share(shown: CandidateCluster, size: int, total: int) -> str:
-    """Say how many candidates act like a cluster, in all worlds and in this one, and whether it waits."""
-    worlds = counted(len(shown.samples), "imagined world")
+    """Say how many candidates act like a cluster, in all worlds and in this one, and whether it may wait."""
     here = f"; {counted(size - shown.size, 'other')} would do the same here, but not in other worlds"
-    waits = f"; waits or ends without success in {shown.in_vain} of {worlds}"
+    waits = "; in some imagined worlds, waits without end or ends without success"
     share = f"{shown.size} of {counted(total, 'program')}"
     return f"{share}{here * (size > shown.size)}{waits * bool(shown.in_vain)}"
 

@@ -25,6 +25,7 @@ from codebotler.core.errors import UserError, expect_list
 from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import SkillTable
 from codebotler.core.text.labels import check_label
+from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.simulator.guard.contract import Contract
 from codebotler.simulator.guard.house_rule import Rule
 from codebotler.simulator.pool import SHARED_POOL, WorkerPool, shared_pool
@@ -178,7 +179,11 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
     is_complete = explored.is_complete and explored.is_steady and not written.reads_clock
     samples, problems, proofs = list(found.samples), list(found.problems), []
     ends_if_a_skill_fails = not CATCHES_ERRORS.search(program)
+    custom = [settings.skills[name] for name in {call.skill for call in explored.calls} - {*SKILLS}]
     for rule in settings.house_rules:
+        named = {one.kind for one in elements(rule.formula)}
+        # Rules do not see what a custom skill does, unless they name it.
+        hides = any(not row.is_idle and getattr(row.recording, "kind", "") not in named for row in custom)
         sampler = explored.violations.get(rule.name)
         number = next((one.samples[0] for one in found.problems if one.rule == rule.name), None)
         if sampler is not None and number is None:
@@ -187,7 +192,8 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
             runs = SampledRuns(program, found.room_map, [sampler], how)
             samples.append(replace(runs.samples_on(worker, {})[0], number=number, is_chosen=True))
             problems += group_failures(samples[number:], found.room_map)
-        verdict: RuleVerdict = "possible" if number is not None else "never" if is_complete else "unknown"
+        is_proven = is_complete and not hides
+        verdict: RuleVerdict = "possible" if number is not None else "never" if is_proven else "unknown"
         proofs.append(RuleProof(rule.name, verdict, explored.cases, number, ends_if_a_skill_fails))
     if any(not problem.rule for problem in problems):  # a robot may get further than these runs
         explored = replace(explored, is_complete=False)

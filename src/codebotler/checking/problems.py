@@ -159,9 +159,10 @@ class CheckResult:
 
     @property
     def vain_runs(self) -> str:
-        """A note: "in 2 of 5 worlds, the robot waits or ends without success"; empty if in none or in all."""
+        """A note: "in 2 of 5 worlds, the robot waits or ends without success"; empty if that is a problem."""
         count, total = sum(sample.in_vain for sample in self.samples), len(self.samples)
-        return f"in {count} of {total} worlds, the robot waits or ends without success" * (0 < count < total)
+        is_note = count > 0 and (count < total or not self.problems)
+        return f"in {count} of {total} worlds, the robot waits or ends without success" * is_note
 
     @property
     def evidence(self) -> frozenset[int]:

@@ -44,8 +44,6 @@ def with_repetition_problems(
 ) -> CheckResult:
     """Return a check with further problems: repeated steps, and a held thing that is never put down.
 
-    Endless waiting is allowed if the first program would also wait: what it waits for may still happen.
-
     Args:
         found: the check of a program for the rest of a mission; `room_map.past` has the steps done so far.
         begun: the first program of the mission.
@@ -56,8 +54,6 @@ def with_repetition_problems(
     if others * max((len(one.outcome.trace) for one in found.samples), default=0) > MAX_COMPARED_PAIRS:
         message = "the mission has too many earlier steps; this program cannot be compared with them"
         return replace(found, problems=(*problems, Problem("LongPast", message)))
-    if remaining and all(one.status is Status.TIMEOUT for one in remaining):
-        problems = [problem for problem in problems if problem.kind != "TimeoutError"]
     for sample in found.samples:
         repeated = (*repeated_steps(sample.outcome.trace, found.room_map, remaining),)
         samples.append(replace(sample, repeated=repeated))

@@ -286,6 +286,7 @@ class Console:
             session, self._may_recover = self.session, None
             self.presses += 1
             lost = self._forget_loss()
+            self._end_hold()
             asking = self._asking
             is_active = asking is not None or (session is not None and not session.view.is_over)
             other = "" if is_active or lost is not None else Reservation(self.robot, self.home).holder()

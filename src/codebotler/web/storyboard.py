@@ -16,6 +16,7 @@ from codebotler.core.terminal import shortened
 from codebotler.core.text.phrases import NO_ANSWER, bracketed, is_question, is_spoken, phrase
 from codebotler.core.trace import Event
 from codebotler.missions.display.progress import ANSWER
+from codebotler.simulator.worlds.sampled_facts import PRESENT_FORM
 from codebotler.web.frame import PlainText
 
 _MAX_STEP_TEXT, _MAX_WORLD_TEXT, MAX_STRIPS = 300, 800, 6
@@ -152,12 +153,18 @@ def _number(element: PlainText, step: int, anchor: str) -> None:
 
 def strips(check: CheckResult) -> list[Strip]:
     """Return a strip for each distinct outcome of a check: at most 6, those with problems first."""
-    different: dict[tuple[tuple[Scene, ...], str], tuple[bool, Strip]] = {}
+    different: dict[tuple[tuple[Scene, ...], str], tuple[Sample, Strip]] = {}
     for sample in check.samples:
         strip = _strip(sample, check)
-        different.setdefault((strip.scenes, strip.ending), (sample.number in check.evidence, strip))
-    ranked = sorted(different.values(), key=lambda each: (not each[0], not each[1].ends_well))
-    return [strip for _, strip in ranked[:MAX_STRIPS]]
+        different.setdefault((strip.scenes, strip.ending), (sample, strip))
+
+    def rank(each: tuple[Sample, Strip]) -> tuple[bool, bool, int]:
+        """Prefer worlds in which fewer people and things are in several rooms: they are more usual."""
+        places = {fact.names for fact in each[0].facts if fact.form == PRESENT_FORM}
+        more = len(places) - len({name for name, _ in places})
+        return each[0].number not in check.evidence, not each[1].ends_well, more
+
+    return [strip for _, strip in sorted(different.values(), key=rank)[:MAX_STRIPS]]
 
 
 def _strip(sample: Sample, check: CheckResult) -> Strip:

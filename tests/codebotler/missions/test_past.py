@@ -350,7 +350,12 @@ def test_steps_of_earlier_missions_do_not_count_as_this_programs() -> None:
 def test_rest_may_wait_for_a_missing_person() -> None:
     rest = WAIT.replace("Hello", "Good morning")
     assert follow(WAIT, rest, WENT, MISSED) == set()
-    assert follow(POLL, rest, WENT, MISSED) == {"TimeoutError"}
+    assert follow(POLL, rest, WENT, MISSED) == set(), "she may come while the robot waits"
+    for wrong in ("place('cup')", "ask('Nobody', 'Done?', [])"):
+        assert follow(WAIT, f"{rest}    {wrong}\n", WENT, MISSED), "what comes after the wait is checked, too"
+    leaves = WAIT.replace("not is_in_room", "is_in_room")
+    assert follow(leaves, leaves, WENT, replace(MISSED, found=True)) == set()
+    assert follow(leaves, f"{leaves}    place('cup')\n", WENT, replace(MISSED, found=True))
 
 
 VISIT = """

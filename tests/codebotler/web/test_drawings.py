@@ -265,6 +265,19 @@ def test_a_wait_is_drawn_in_the_room_where_the_robot_waits() -> None:
     assert kitchen == ["bye"]
 
 
+def test_usual_worlds_come_first() -> None:
+    program = """def task_program():
+    for room in get_all_rooms():
+        go_to(room)
+        if is_in_room("Lena"):
+            say(f"Lena is in {room}.")
+"""
+    shown = strips(check(program, rooms=["hall", "kitchen", "lab", "den"]))
+    found = [sum(deed.kind == "say" for scene in strip.scenes for deed in scene.deeds) for strip in shown]
+    assert found == sorted(found, key=lambda number: max(number - 1, 0))
+    assert found[0] <= 1 < found[-1], "Lena is in one room at most"
+
+
 def test_a_long_run_is_shortened_once_even_if_many_steps_are_needed() -> None:
     trace = tuple(Event(kind, "mug", place="hall") for _ in range(250) for kind in ("check", "pick", "place"))
     steps = steps_of(trace)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 
 from codebotler.core.skills.kinds import ASK, GOTO, PICK, PLACE, SAY
+from codebotler.core.skills.paper import SKILLS
 from codebotler.core.skills.table import Skill, SkillTable
 from codebotler.core.text.phrases import verb
 from codebotler.core.text.words import brief_part, counted, elide_list, listed
@@ -45,7 +46,7 @@ def contract_rows(
 def contract_sentence(
     contract: Contract, skills: SkillTable, show: Callable[[str], str] = brief_part, *, is_short: bool = True
 ) -> str:
-    """Return a contract in a sentence or two: what the program may do, and what it never does.
+    """Return a contract in a sentence or two: what the program may do and, without custom skills, never does.
 
     If `is_short`, long lists end with a number, such as "or 4 more". `show` shortens a single text.
     """
@@ -53,6 +54,8 @@ def contract_sentence(
     may = [f"{what} {allowed}".strip() for what, allowed, _ in rows]
     known = {row.recording.kind: row.name for row in skills.rows if row.recording is not None}
     never = [what for kind, what in NEVER.items() if known.get(kind, "") not in {"", *contract.skills}]
+    if not contract.skills.keys() <= SKILLS.keys():  # a custom skill may do any of these
+        never = []
     parts = [f"It may {'; '.join(may)}" if may else "", f"It {listed(never)}" if never else ""]
     return " ".join(f"{part}." for part in parts if part)
 

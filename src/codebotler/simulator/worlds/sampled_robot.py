@@ -72,8 +72,7 @@ class SampledRobot(SimulatedRobot):
         super().__init__(world, settings, skills, guard=guard)
         self.setup = "sampled", (room_map, sampler, settings)
         self.room_map, self.sampler = room_map, sampler
-        self.contents = defaultdict(list)
-        self.occupants = defaultdict(list)  # always empty, since no world file names people
+        self.contents, self.occupants = defaultdict(list), defaultdict(list)  # no world file names occupants
         self.explored: defaultdict[str, ExploredRoom] = defaultdict(ExploredRoom)
         self.answers: dict[tuple[str, ...], str] = {}  # answers by room, person and question
         self.questions = defaultdict[tuple[str, ...], list[tuple[str, ...]]](list)  # by room and options
@@ -85,6 +84,7 @@ class SampledRobot(SimulatedRobot):
         self.has_assumed = False  # whether a fact holds that strict worlds would draw
         for event in room_map.past:
             self._recall(event)
+        self.recalled = {room: (one.people.copy(), one.missed.copy()) for room, one in self.explored.items()}
         self.room = world.robot
 
     @property
@@ -192,9 +192,7 @@ class SampledRobot(SimulatedRobot):
 
     def settle(self, name: str, room: str, *, is_random: bool) -> bool:
         """Decide, record and return whether a person or thing is in a room (True unless `is_random`)."""
-        is_there = True
-        if is_random:
-            is_there = bool(self._draw("is_there", room, name))
+        is_there = not is_random or bool(self._draw("is_there", room, name))
         self.has_assumed |= not is_random
         self.facts.append(whereabouts(name, room, is_there=is_there, is_random=is_random))
         if not is_there:
@@ -224,7 +222,14 @@ class SampledRobot(SimulatedRobot):
             self.facts.append(SampledFact("{} {}", (statement, possible[drawn])))
         return self.outcomes[statement]
 
-    # --- effects of skills
+    def sleep_until(self, now: float) -> None:
+        """Let time pass. What an earlier mission saw of people, missed, or was answered may change."""
+        super().sleep_until(now)
+        self.answers = {} if self.recalled else self.answers  # those of this program are drawn alike again
+        for room, (people, missed) in self.recalled.items():
+            self.explored[room].people -= people
+            self.explored[room].missed -= missed
+        self.recalled = {}
 
     def known_names(self, sort: Literal["room", "thing", "person"]) -> Sequence[str]:
         """Return the names of all rooms, or of the things or people that the room map lists."""
@@ -240,10 +245,8 @@ class SampledRobot(SimulatedRobot):
         """Return whether an object or a person is in this room. The first look decides this at random."""
         name = normalized(entity)
         described = [] if self.is_here(name) is not None else self._described(entity)
-        if described:  # each of them is there or not
-            found = any(self._find(normalized(one), is_person=means_person(entity)) for one in described)
-        else:
-            found = self._find(name, is_person=means_person(entity))
+        names = [*map(normalized, described)] or [name]  # each of them is there or not
+        found = any(self._find(one, is_person=means_person(entity)) for one in names)
         search = self.searches[name]
         (search.rooms_with if found else search.rooms_without).add(self.room)
         self.record(CHECK, entity, found=found)
@@ -287,15 +290,13 @@ class SampledRobot(SimulatedRobot):
         return self._all_of(self.room_map.people, where, wanted, is_person=True)
 
     def _all_of(self, known: Sequence[str], where: str, wanted: str, *, is_person: bool) -> list[str]:
-        words = WORDS_FOR_PEOPLE if is_person else WORDS_FOR_THINGS
-        fitting = self._fitting(known, wanted, words)
+        fitting = self._fitting(known, wanted, WORDS_FOR_PEOPLE if is_person else WORDS_FOR_THINGS)
         names = {normalized(name): name for name in fitting or [wanted]}
         goals: Sequence[str] = self._goals_in(where)
         if is_person:
             goals = [self._room_around(self.goal_of(where))] if where else self.rooms
-        before = self.room
+        before, described = self.room, normalized(wanted)
         found = []
-        described = normalized(wanted)
         for self.room in goals:
             is_known = described in self.here.missed  # an earlier look for this description found nothing
             finds = self.is_here if is_known else partial(self._find, is_person=is_person)
@@ -361,8 +362,7 @@ class SampledRobot(SimulatedRobot):
         return SOMEBODY not in self.explored[self._around].missed
 
     def _answers(self, who: str) -> bool:
-        is_there = self.is_here(who)
-        around = self.explored[self._around]
+        is_there, around = self.is_here(who), self.explored[self._around]
         if is_there is None and around.lacks(SOMEBODY):
             is_there = False
         if is_there is None:
