@@ -1238,6 +1238,21 @@ def test_a_no_counts_only_for_the_program_in_the_question(gatekeeper: Gatekeeper
     use(gatekeeper, act, answer=answer, mode="legacy")
 
 
+def test_a_yes_does_not_outlive_a_stop(gatekeeper: Gatekeeper) -> None:
+    gatekeeper.asks_client = True
+
+    async def answer(context: ClientRequestContext, params: ElicitRequestParams) -> ElicitResult:  # noqa: ARG001 - the SDK passes it
+        gatekeeper.console.stop("a person", only_moving=True, holds=True)
+        return ElicitResult(action="accept", content={"approve": True})
+
+    async def act(agent: Agent) -> None:
+        digest = (await agent.call("propose_mission", program=QUIET))["digest"]
+        assert "STOP" in await agent.fails("run_mission", digest=digest, seconds=0.05)
+        assert view_of(gatekeeper).may_be_approved
+
+    use(gatekeeper, act, answer=answer, mode="legacy")
+
+
 def test_a_late_yes_accepts_only_the_problems_of_its_own_question(tmp_path: Path) -> None:
     gatekeeper, asked = gatekeeper_at(tmp_path, rules=(STAY_OUT,)), list[str]()
     gatekeeper.asks_client = True

@@ -318,6 +318,20 @@ def test_contract_also_limits_skills_without_events(contracts: Contracts) -> Non
     assert with_contract_problems(found, Contract({}), SKILLS.with_skill(silent)).problems
 
 
+@pytest.mark.parametrize("is_idle", [True, False])
+def test_what_a_custom_skill_may_do_is_not_denied(pool: WorkerPool, is_idle: bool) -> None:  # noqa: FBT001 - a parameter
+    """Neither contracts nor rules see inside such a skill, unless it declares that it moves nothing."""
+    skills = SKILLS.with_skill(
+        Skill("tidy_up", (), ValueType(None), "Tidy up.", is_idle=is_idle, does=lambda _: None)
+    )
+    rule = Rule("cafe", "cafe", parse('not tr.Exists(goto("café"))'))
+    program = "def task_program():\n    tidy_up()\n"
+    found = check(program, room_map=ROOMS, pool=pool, house_rules=(rule,), explores=True, skills=skills)
+    assert found.contract is not None
+    assert ("drives nowhere" in contract_sentence(found.contract, skills)) == is_idle
+    assert [proof.verdict for proof in found.proofs] == ["never" if is_idle else "unknown"]
+
+
 def test_computed_text_is_unbounded_if_a_question_is_asked_twice(contracts: Contracts) -> None:
     poll = """
 def task_program():

@@ -810,8 +810,8 @@ def test_each_press_reaches_a_robot_that_was_lost(tmp_path: Path) -> None:
         assert console.stop("a person", only_moving=True), "a waiting mission is connected to this robot"
         wait_until(console, lambda view: view.is_over)
         begin_and_approve(console, "def task_program():\n    say('a')\n")
-        assert console.warning == ""
         console.stop("a person", holds=True)
+        assert console.warning == "", "this robot was not lost"
         wait_until(console, lambda view: view.is_over)
         begin_and_check(console)
         assert console.warning == "", "a person has approved a mission since"

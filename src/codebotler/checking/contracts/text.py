@@ -54,7 +54,7 @@ def contract_sentence(
     may = [f"{what} {allowed}".strip() for what, allowed, _ in rows]
     known = {row.recording.kind: row.name for row in skills.rows if row.recording is not None}
     never = [what for kind, what in NEVER.items() if known.get(kind, "") not in {"", *contract.skills}]
-    if not contract.skills.keys() <= SKILLS.keys():  # a custom skill may do any of these
+    if any(name not in SKILLS and not skills[name].is_idle for name in contract.skills):  # it may do these
         never = []
     parts = [f"It may {'; '.join(may)}" if may else "", f"It {listed(never)}" if never else ""]
     return " ".join(f"{part}." for part in parts if part)
