@@ -30,7 +30,7 @@ _PHASE_HEADLINES: Mapping[Phase, str] = {
     MissionState.CHECKED: "Ready: waiting for your approval",
     MissionState.APPROVED: "Starting",
 }
-CONTINUE_HINT = "The model writes the rest, and the robot waits until you approve it."
+CONTINUE_HINT = "Nothing moves until you approve the rest."
 _MAX_LISTED_MOMENTS, _MAX_TITLE = 60, 160
 
 
