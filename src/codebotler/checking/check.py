@@ -179,11 +179,13 @@ def extend_check(worker: Worker, program: str, found: CheckResult, settings: Che
     is_complete = explored.is_complete and explored.is_steady and not written.reads_clock
     samples, problems, proofs = list(found.samples), list(found.problems), []
     ends_if_a_skill_fails = not CATCHES_ERRORS.search(program)
-    custom = [settings.skills[name] for name in {call.skill for call in explored.calls} - {*SKILLS}]
+    called = (settings.skills[name] for name in {call.skill for call in explored.calls} - {*SKILLS})
+    hidden = {
+        getattr(row.recording, "kind", "") for row in called if not row.is_idle
+    }  # events of such skills
     for rule in settings.house_rules:
-        named = {one.kind for one in elements(rule.formula)}
-        # Rules do not see what a custom skill does, unless they name it.
-        hides = any(not row.is_idle and getattr(row.recording, "kind", "") not in named for row in custom)
+        # Rules do not see what else a custom skill does.
+        hides = bool(hidden) and not {one.kind for one in elements(rule.formula)} <= hidden
         sampler = explored.violations.get(rule.name)
         number = next((one.samples[0] for one in found.problems if one.rule == rule.name), None)
         if sampler is not None and number is None:

@@ -145,6 +145,14 @@ def test_a_cookie_cannot_be_made_from_a_token() -> None:
     assert other.of_cookie(one.cookie(Role.OPERATOR)) is None
 
 
+def test_only_a_face_keeps_its_cookie_after_a_restart() -> None:
+    """While the server is down, another program may take its port, and get the cookies of open pages."""
+    before, after = (Access("o" * 20, "f" * 20, cookie_secret=b"kept") for _ in range(2))
+    assert after.of_cookie(before.cookie(Role.FACE)) is Role.FACE
+    assert after.of_cookie(before.cookie(Role.OPERATOR)) is None
+    assert before.of_cookie(before.cookie(Role.OPERATOR)) is Role.OPERATOR
+
+
 def test_the_secret_of_cookies_outlives_a_restart(tmp_path: Path) -> None:
     first = read_cookie_secret(tmp_path / "home")
     assert read_cookie_secret(tmp_path / "home") == first

@@ -237,7 +237,8 @@ def serve_page(
     access = Access.from_options(token, face_token, open_to_all=no_token, is_private=place.is_private)
     shown = Face(face_timeout) if face else None
     console = open_console(model, base_url, shared, candidates=candidates, face=shown, recoveries=recover)
-    access = replace(access, cookie_secret=read_cookie_secret(console.home))
+    if face:  # its screen on the robot outlives a restart
+        access = replace(access, cookie_secret=read_cookie_secret(console.home))
     serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated, Any
 
 import typer
@@ -51,7 +50,7 @@ def serve_agents(
     from codebotler.cli.operating.serving import open_console
     from codebotler.core.terminal import note
     from codebotler.models.recorded import is_recorded
-    from codebotler.web.security.access import AGENT_PATH, Access, PageAddress, read_cookie_secret
+    from codebotler.web.security.access import AGENT_PATH, Access, PageAddress
     from codebotler.web.server import serve
 
     asks = not http if ask_client is None else ask_client
@@ -64,7 +63,6 @@ def serve_agents(
     gatekeeper = Gatekeeper(console, asks_client=asks, writes=writes)
     agents = server.make_server(gatekeeper)
     access = Access.from_options(token, agent=agent_token)
-    access = replace(access, cookie_secret=read_cookie_secret(console.home))
 
     def announce(address: str) -> None:
         gatekeeper.page = address

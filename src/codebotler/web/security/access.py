@@ -66,6 +66,7 @@ class Access:
     now: Callable[[], float] = time.monotonic
     cookie_secret: bytes = field(default_factory=lambda: secrets.token_bytes(SECRET_BYTES))
     _wrong: dict[str, deque[float]] = field(default_factory=dict)
+    _start: str = field(default_factory=new_token)  # of this process
 
     @classmethod
     def from_options(
@@ -95,7 +96,7 @@ class Access:
 
     def of_token(self, token: str, address: str) -> Role | None:
         """Return a token's role, or None. Raise TooManyTriesError if `address` has sent many invalid ones."""
-        role = self._of(token, lambda known: known)
+        role = self._of(token, lambda _, known: known)
         if role in self.unguessable:
             return role
         wrong = self._wrong.get(address, deque(maxlen=MAX_WRONG_TOKENS))
@@ -111,16 +112,20 @@ class Access:
 
     def of_cookie(self, value: str) -> Role | None:
         """Return the role for a cookie, or None if the cookie is invalid."""
-        return self._of(value, self._cookie_value)
+        return self._of(value, self._cookie)
 
     def cookie(self, role: Role) -> str:
         """Return a role's cookie, from which the token cannot be derived."""
-        return self._cookie_value(self._tokens[role] or "")
+        return self._cookie(role, self._tokens[role] or "")
 
     @property
     def path(self) -> str:
         """The page's secret path prefix. Cookies are limited to it, so servers on other ports get none."""
         return f"/{self._cookie_value('path')[:SECRET_BYTES]}"
+
+    def _cookie(self, role: Role, token: str) -> str:
+        # After the end of this process, others may take its port, and open pages send them their cookies.
+        return self._cookie_value(token if role is Role.FACE else f"{token} {self._start}")
 
     def _cookie_value(self, token: str) -> str:
         return hmac.new(self.cookie_secret, token.encode(), hashlib.sha256).hexdigest()
@@ -129,9 +134,9 @@ class Access:
     def _tokens(self) -> Mapping[Role, str | None]:
         return {Role.OPERATOR: self.operator, Role.FACE: self.face, Role.AGENT: self.agent}
 
-    def _of(self, shown: str, form: Callable[[str], str]) -> Role | None:
+    def _of(self, shown: str, form: Callable[[Role, str], str]) -> Role | None:
         for role, token in self._tokens.items():
-            if token and hmac.compare_digest(form(token).encode(), shown.encode(errors="replace")):
+            if token and hmac.compare_digest(form(role, token).encode(), shown.encode(errors="replace")):
                 return role
         return None
 
