@@ -189,7 +189,8 @@ def question_about(
 def _share(shown: CandidateCluster, size: int, total: int) -> str:
     """Say how many candidates act like a cluster, in all worlds and in this one, and whether it may wait."""
     here = f"; {counted(size - shown.size, 'other')} would do the same here, but not in other worlds"
-    waits = "; in some imagined worlds, waits without end or ends without success"
+    is_endless = any(one.in_vain and one.outcome.status is Status.TIMEOUT for one in shown.samples)
+    waits = f"; may {'wait or search without end' if is_endless else 'end without success'}"
     share = f"{shown.size} of {counted(total, 'program')}"
     return f"{share}{here * (size > shown.size)}{waits * bool(shown.in_vain)}"
 

@@ -46,6 +46,22 @@ def test_look_finds_the_result_of_the_last_look(what: str, found: bool) -> None:
     assert elsewhere == {True, False}, "looks in another room must stay random"
 
 
+def test_what_was_seen_may_change_once_time_passes() -> None:
+    seen = [
+        event(CHECK, "Anne", found=True),
+        event(CHECK, "mug", found=False),
+        event(CHECK, "pen", found=True),
+    ]
+    after: dict[str, set[object]] = {"Anne": set(), "mug": set(), "pen": set()}
+    for robot in robots(*seen):
+        assert robot.perform("is_in_room", ["Anne"]) is True
+        robot.sleep_until(60.0)
+        for what, found in after.items():
+            found.add(robot.perform("is_in_room", [what]))
+        assert robot.facts[0].sentence.startswith("after the first wait, ")
+    assert after == {"Anne": {True, False}, "mug": {True, False}, "pen": {True}}
+
+
 def test_thing_that_could_not_be_picked_up_is_absent() -> None:
     failed = event(PICK, "mug", "lab", failed="PickInvalidObject")
     for robot in robots(event(CHECK, "mug", "lab", found=True), failed, event(GOTO, "kitchen")):

@@ -32,11 +32,16 @@ class SampledFact:
         return self.form.format(*(name.replace('"', "'") if '"' in self.form else name for name in names))
 
 
-def whereabouts(name: str, room: str, *, is_there: bool, is_random: bool = True) -> SampledFact:
-    """Return the fact that a person or thing is, or is not, in a room. `name` must be `normalized`."""
+def whereabouts(
+    name: str, room: str, since: str = "", *, is_there: bool, is_random: bool = True
+) -> SampledFact:
+    """Return the fact that a person or thing is in a room, or not, after the words `since`.
+
+    `name` must be `normalized`.
+    """
     if name == SOMEBODY:
-        return SampledFact(f'{SOMEBODY if is_there else "nobody"} is in "{{}}"', (room,), is_random)
-    return SampledFact(PRESENT_FORM if is_there else ABSENT_FORM, (name, room), is_random)
+        return SampledFact(f'{since}{SOMEBODY if is_there else "nobody"} is in "{{}}"', (room,), is_random)
+    return SampledFact(since + (PRESENT_FORM if is_there else ABSENT_FORM), (name, room), is_random)
 
 
 # --- the program's knowledge, by canonical names

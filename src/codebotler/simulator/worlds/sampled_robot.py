@@ -53,7 +53,7 @@ class SampledRobot(SimulatedRobot):
     hold: a person answers, and a thing can be picked up. Answers are random options.
     A program that searches several rooms assumes that the thing is in one of them. If the thing is in none,
     `excuses` holds the resulting errors, which are not the program's fault.
-    What the robot last saw before the program began (`RoomMap.past`) is still true.
+    What the robot last saw before the program began (`RoomMap.past`) is true until the program waits.
     """
 
     is_copied = True
@@ -85,7 +85,7 @@ class SampledRobot(SimulatedRobot):
         for event in room_map.past:
             self._recall(event)
         self.recalled = {room: (one.people.copy(), one.missed.copy()) for room, one in self.explored.items()}
-        self.room = world.robot
+        self.room, self.since = world.robot, ""  # since when new facts hold, if not from the beginning
 
     @property
     def idle_skills(self) -> frozenset[str]:
@@ -194,7 +194,7 @@ class SampledRobot(SimulatedRobot):
         """Decide, record and return whether a person or thing is in a room (True unless `is_random`)."""
         is_there = not is_random or bool(self._draw("is_there", room, name))
         self.has_assumed |= not is_random
-        self.facts.append(whereabouts(name, room, is_there=is_there, is_random=is_random))
+        self.facts.append(whereabouts(name, room, self.since, is_there=is_there, is_random=is_random))
         if not is_there:
             self.explored[room].missed.add(name)
         return is_there
@@ -226,6 +226,7 @@ class SampledRobot(SimulatedRobot):
         """Let time pass. What an earlier mission saw of people, missed, or was answered may change."""
         super().sleep_until(now)
         self.answers = {} if self.recalled else self.answers  # those of this program are drawn alike again
+        self.since = "after the first wait, " if self.recalled else self.since
         for room, (people, missed) in self.recalled.items():
             self.explored[room].people -= people
             self.explored[room].missed -= missed
@@ -233,9 +234,7 @@ class SampledRobot(SimulatedRobot):
 
     def known_names(self, sort: Literal["room", "thing", "person"]) -> Sequence[str]:
         """Return the names of all rooms, or of the things or people that the room map lists."""
-        if sort == "room":
-            return self.rooms
-        return self.room_map.things if sort == "thing" else self.room_map.people
+        return {"room": self.rooms, "thing": self.room_map.things, "person": self.room_map.people}[sort]
 
     def room_for(self, request: str) -> str | None:
         """Return the room that a request means, or None. A guessed map has a room for every request."""
