@@ -214,6 +214,8 @@ class _Answer:
             kind = headers.pop("Content-Type", "text/event-stream")
             extra = "".join(f"{name}: {value}\r\n" for name, value in headers.items())
             return self._send_body(status, body, kind, extra)
+        if not self.request.body:  # of a page, say, whose own server had this port before
+            return self._refuse(404, "there is no such page", None)
         return await self._send_own()
 
     async def _send_own(self) -> bool:
