@@ -320,7 +320,7 @@ def test_unwritable_home_is_refused_before_the_page_starts(tmp_path: Path) -> No
     process = Forked(*SERVE, "--port", "0", cwd=tmp_path, environment=environment, preload=PAGE)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out, err.count("\n")) == (2, "", 1)
-    assert err.startswith("codebotler: /sys/home: ")
+    assert err.startswith("codebotler: /sys/home/missions: ")
     assert "CODEBOTLER_HOME" in err
 
 
